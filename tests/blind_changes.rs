@@ -1,7 +1,7 @@
 //! Hide and find effects that any fit would absorb: against a simulation without the effect, or against a second log.
 //! Also contacts, which no fit absorbs. The plant produces everything that is hidden.
 
-use armid::diagnose::{Cause, Diagnosis, Estimate, Kind, Nominal, Validation};
+use armid::diagnose::{Cause, Diagnosis, Estimate, Kind, Nominal, Validation, Verdict};
 use armid::identify::{Identifier, Measurement};
 
 use crate::simulated::{NOISE, Run, assert_holds, scenario};
@@ -250,6 +250,9 @@ fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
     told.add_payload(swapped);
     let said = &told.sentences;
     assert!(said.iter().any(|s| s.contains("does not carry over")), "{said:?}");
+    // A flange that carries less is no good log, whatever the first log says.
+    assert_ne!(told.verdict, Verdict::NothingFound, "{said:?}");
+    assert!(!said.iter().any(|s| s.starts_with("Nothing found")), "{said:?}");
     // The body that is missing is told first.
     let first = usize::from(told.doubt.is_some());
     assert_eq!(said[first..first + of_the_body.len()], of_the_body);

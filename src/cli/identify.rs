@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::robot::{inputs, load_robot};
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
-use crate::diagnose::without_wild_readings;
+use crate::diagnose::Mended;
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalError, PhysicalOptions, PriorMetric, PriorWeight};
@@ -134,7 +134,7 @@ pub struct LoadedLog {
     pub torque_nm: JointSignals,
     /// The file the log was read from.
     pub input: Input,
-    /// Remarks on wild readings that were replaced.
+    /// Remarks on faults of the record.
     pub mended: Vec<String>,
 }
 
@@ -156,9 +156,13 @@ impl LoadedLog {
 const SAME: f64 = 0.5;
 
 impl LoadedLog {
-    /// Replaces wild readings by what their neighbours say they should be.
-    fn mend_wild_readings(&mut self) {
-        let Some((channels, remarks)) = without_wild_readings(&self.measurement()) else { return };
+    /// Corrects what can be corrected within its rows, and remarks on every other fault of the record. Logs that cannot be
+    /// processed are left to the identification, which says why.
+    fn mend(&mut self) {
+        let Ok(Mended { time_s, channels, remarks }) = Mended::of(&self.measurement()) else {
+            return;
+        };
+        self.log.time_s = time_s;
         [self.log.q_rad, self.log.qd_rad_s, self.torque_nm] = channels;
         let of_log = |remark| format!("{}: {remark}", self.log.source);
         self.mended = remarks.into_iter().map(of_log).collect();
@@ -334,7 +338,7 @@ impl Sources {
         let mut logs = read_logs(&args.logs, &arm, &layout)?;
         let mut validation_logs = read_logs(&args.validate, &arm, &layout)?;
         refuse_twice(&logs, &validation_logs)?;
-        logs.iter_mut().chain(&mut validation_logs).for_each(LoadedLog::mend_wild_readings);
+        logs.iter_mut().chain(&mut validation_logs).for_each(LoadedLog::mend);
         inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
         let sources = Self { arm, layout, set, logs, validation_logs };
         Ok((sources, Program::started(None, inputs)))

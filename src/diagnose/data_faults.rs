@@ -205,7 +205,7 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
 }
 
 /// Rows of a moving arm that repeat the row before in every channel.
-fn repeats(m: &Measurement) -> Vec<usize> {
+pub(super) fn repeats(m: &Measurement) -> Vec<usize> {
     let channels = [m.q_rad, m.qd_rad_s, m.torque_nm];
     let moves =
         |k: usize| (0..m.q_rad.joints()).any(|j| m.qd_rad_s.joint(j)[k].abs() > MOVES_RAD_S);
@@ -214,6 +214,9 @@ fn repeats(m: &Measurement) -> Vec<usize> {
     (1..m.time_s.len()).filter(|&k| moves(k) && channels.iter().all(|s| same(s, k))).collect()
 }
 
+/// Whole rows that are missing or repeated, in words.
+pub(super) const MISSING_OR_REPEATED: &str = "samples that are missing or repeat the one before";
+
 /// Rows that repeat the one before, or that are missing according to the time stamps.
 fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     let step_s = step_s(m);
@@ -221,9 +224,8 @@ fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
         (1..m.time_s.len()).map(|k| missing_steps(m.time_s, k, step_s).round()).sum();
     let fraction = (missing + repeats.len() as f64) / (missing + m.time_s.len() as f64);
     (fraction > MISSED).then(|| {
-        let words = "samples that are missing or repeat the one before";
         let parameters = [("fraction", Estimate::exact(fraction, ""))];
-        Cause::certain(Kind::DroppedSamples, None, words, f64::INFINITY, &parameters)
+        Cause::certain(Kind::DroppedSamples, None, MISSING_OR_REPEATED, f64::INFINITY, &parameters)
     })
 }
 

@@ -93,13 +93,13 @@ impl<'a> Diagnoser<'a> {
         let Explanation { study, null, .. } = &explanation;
         let kept = explanation.kept();
         let selected = kept.selected();
-        let mut model = self.extended(study, &kept, &selected, &explanation.gains);
-        let laws = OnJoint::of(study, &selected, &model.extension.effects);
+        let mut model = self.extended(study, &kept, selected, &explanation.gains);
+        let laws = OnJoint::of(study, &model.selected, &model.extension.effects);
         let touches = touches(&log, study, &model.after_nm)?;
         if let Some(simulation) = simulation {
-            self.compare(study, &selected, simulation, &mut model);
+            self.compare(study, simulation, &mut model);
         }
-        let Extended { causes, extension, after_nm, accepted, rest } = model;
+        let Extended { causes, extension, after_nm, accepted, rest, .. } = model;
         let faults = [log.faults.clone(), touches].concat();
         let mut causes = in_order(faults, causes, study.scene.periodic);
         let tears = take_out_tears(&mut causes, m);
@@ -117,7 +117,8 @@ impl<'a> Diagnoser<'a> {
         let left = left(study, (&accepted, &rest), lack.as_ref(), (&causes, &form), &log);
         let Left { unexplained, form_error } = left.at_most(&after_rms_nm);
         if let Some(unknown) = &unexplained {
-            make_modest_beside_unknown(&mut causes, unknown.site(), study.scene.periodic);
+            let joints = study.scene.joints();
+            make_modest_beside_unknown(&mut causes, unknown.site(), (joints, study.scene.periodic));
         }
 
         // What it is worth elsewhere.
@@ -271,6 +272,7 @@ fn gain_along(
     models: &Models,
     causes: &[Cause],
 ) -> Result<HeldOut, DiagnoseError> {
+    log.measurement.require_rows()?;
     // The recorder has the same lags on other days.
     let mut record = Record::without_rows(&log.measurement, &[]);
     record.undo_lags(causes);

@@ -8,6 +8,7 @@ use super::extension::{Effect, Extension};
 use super::image::{Image, Span};
 use super::intervals;
 use super::judgement::Selected;
+use super::kind::Kind;
 use super::selection::Kept;
 use super::settled::{fitted, residual};
 use super::study::{Entry, Study};
@@ -16,8 +17,10 @@ use crate::robot::JointSignals;
 
 /// The extended model, and the causes to report.
 pub(super) struct Extended {
-    pub causes: Vec<Cause>,
+    /// The causes that were kept, with their alternatives, in the order of the effects of `extension`.
+    pub selected: Vec<Selected>,
     pub extension: Extension,
+    pub causes: Vec<Cause>,
     /// Residual of the extended model, Nm.
     pub after_nm: JointSignals,
     /// Span of the causes outside the null model, and the residual of the null model without its part in this span.
@@ -32,7 +35,7 @@ impl Diagnoser<'_> {
         &self,
         study: &Study,
         kept: &Kept,
-        selected: &[Selected],
+        selected: Vec<Selected>,
         gains: &[Option<f64>],
     ) -> Extended {
         let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
@@ -43,29 +46,38 @@ impl Diagnoser<'_> {
         };
         let causes = selected.par_iter().enumerate().map(cause).collect();
         let (accepted, rest) = kept.without(None);
-        Extended { causes, after_nm: residual(study, &extension), extension, accepted, rest }
+        let after_nm = residual(study, &extension);
+        Extended { selected, extension, causes, after_nm, accepted, rest }
     }
 
     /// Compares the log with a `simulation`. A kind of cause that can be a change against the simulation is judged by
     /// this comparison alone, in which effects that any fit would absorb stand out too. Effects that the changes make
-    /// needless are dropped.
-    pub(super) fn compare(
-        &self,
-        study: &Study,
-        selected: &[Selected],
-        simulation: Nominal,
-        model: &mut Extended,
-    ) {
-        let found = selected.iter().zip(&model.extension.effects).map(|(selected, effect)| Found {
-            entry: &selected.contender.entry,
-            effect,
-            alike: selected.alike(),
-        });
+    /// needless are dropped, and the others judged anew without them.
+    pub(super) fn compare(&self, study: &Study, simulation: Nominal, model: &mut Extended) {
+        let found =
+            model.selected.iter().zip(&model.extension.effects).map(|(selected, effect)| Found {
+                entry: &selected.contender.entry,
+                effect,
+                alike: selected.alike(),
+            });
         let found: Vec<Found> = found.collect();
         let fitted_nm = fitted(study, &model.extension);
         let sources = (self.arm, self.set);
         let explained = against::explain(study, sources, simulation, &found, &fitted_nm);
-        model.causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
+        let judged = |place: (Kind, Option<usize>)| explained.judged.contains(&place);
+        // An effect that is not found again beside the simulation leaves the model.
+        let stays = |selected: &&Selected| {
+            let entry = &selected.contender.entry;
+            let place = (self.families[entry.family].kind(), entry.site.map(|j| j + 1));
+            let is_a_change = |cause: &Cause| (cause.kind, cause.joint) == place;
+            !judged(place) || explained.causes.iter().any(is_a_change)
+        };
+        if !model.selected.iter().all(|selected| stays(&selected)) {
+            let left = model.selected.iter().filter(stays).map(|s| s.contender.clone());
+            let kept = Kept::of(study, left.collect());
+            *model = self.extended(study, &kept, kept.selected(), &kept.gains());
+        }
+        model.causes.retain(|c| !judged((c.kind, c.joint)));
         model.causes.extend(explained.causes);
         if simulation.doubt.is_some() {
             // The laws become provisional as well, because they were found beside the changes.
@@ -75,17 +87,6 @@ impl Diagnoser<'_> {
         model.rest = study.residual.clone();
         explained.span.residualise(&mut model.rest);
         model.accepted = explained.span;
-        // An effect that is not found again beside the simulation leaves the model.
-        let is_named = |entry: &&Entry| {
-            let place = (self.families[entry.family].kind(), entry.site.map(|j| j + 1));
-            model.causes.iter().any(|cause| (cause.kind, cause.joint) == place)
-        };
-        let entries = selected.iter().map(|s| &s.contender.entry);
-        let named: Vec<&Entry> = entries.filter(is_named).collect();
-        if named.len() < selected.len() {
-            model.extension = Extension::fit(study, &named, &study.torque);
-            model.after_nm = residual(study, &model.extension);
-        }
     }
 
     /// Cause number `index` of those `kept`, as it is reported.

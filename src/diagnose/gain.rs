@@ -29,12 +29,17 @@ impl Kept<'_, '_> {
     /// the same site. Returns the gains of those that stay ([`on_other_periods`]).
     pub fn drop_idle(&mut self) -> Vec<Option<f64>> {
         loop {
-            let entries: Vec<&Entry> = self.causes.iter().map(|cause| &cause.entry).collect();
-            let gains = on_other_periods(self.study, &entries);
+            let gains = self.gains();
             let Some(worst) = most_harmful(&gains) else { return gains };
             let site = self.causes.remove(worst).entry.site;
             self.refine_at(site);
         }
+    }
+
+    /// What each cause gains beside the others ([`on_other_periods`]).
+    pub fn gains(&self) -> Vec<Option<f64>> {
+        let entries: Vec<&Entry> = self.causes.iter().map(|cause| &cause.entry).collect();
+        on_other_periods(self.study, &entries)
     }
 }
 

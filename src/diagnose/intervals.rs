@@ -144,9 +144,10 @@ pub fn physical(
         let tangents = Tangents::outside(study, &others, &form.effect);
         let half = left.sqrt() * quantile;
         let other = of_one_form(study, &form.effect, (&tangents, &residual), half);
-        // A form with the opposite sign bends the other way where this matters less; it is a different statement.
+        // A form with the opposite sign bends the other way where this matters less; it is a different statement. The
+        // sign of a phase states nothing.
         let is_opposite = |(name, own): (&&str, &Estimate)| {
-            other.get(name).is_some_and(|other| own.value * other.value < 0.0)
+            *name != PHASE && other.get(name).is_some_and(|other| own.value * other.value < 0.0)
         };
         if out.iter().any(is_opposite) {
             continue;
@@ -182,13 +183,15 @@ pub fn physical(
 /// Least factor of warm friction for which intervals are stretched.
 const LEAST_WARM: f64 = 0.2;
 
+/// The parameter that wraps: values a whole turn apart are the same.
+const PHASE: &str = "phase_rad";
+
 /// Extends the intervals `own` to cover those of `other`; phases are first shifted by whole turns to be near each
 /// other.
 fn reach_over(own: &mut BTreeMap<&'static str, Estimate>, other: &BTreeMap<&str, Estimate>) {
     for (name, own) in own {
         let Some(other) = other.get(name) else { continue };
-        let turns =
-            if *name == "phase_rad" { ((own.value - other.value) / TAU).round() } else { 0.0 };
+        let turns = if *name == PHASE { ((own.value - other.value) / TAU).round() } else { 0.0 };
         other.ci95.into_iter().for_each(|end| own.reach(end + turns * TAU));
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::chance::FALSE_ALARM;
 use super::kind::Kind;
 use super::verdict::Cause;
 
@@ -19,10 +20,8 @@ const SMALLER_PART: f64 = 0.5;
 /// Limit for a cause with so small a gain beside something unexplained. Of eleven such names in three logs of another
 /// simulator none was right; by Clopper and Pearson (1934), fewer than one in four are, with 95 % confidence.
 const BESIDE_MORE: f64 = 0.25;
-/// From this many joints with causes of their own on, the causes count not as many faults but as one effect on the arm
-/// as a whole. If one joint in ten has a fault, three or more of six joints have one in 1.6 % of all arms, and four or
-/// more in 0.13 %: more rarely than a good log is given a fault by chance.
-const MANY_JOINTS: usize = 4;
+/// Probability that a joint has a fault of its own.
+const FAULTY: f64 = 0.1;
 /// A cause with less than this share of the strength of another one beside it may be what the approximate law of the
 /// other leaves.
 const OVERSHADOWED: f64 = 0.5;
@@ -93,23 +92,24 @@ pub(super) fn make_modest(causes: &mut [Cause], is_compared: bool) {
 }
 
 /// Limits the confidence in causes while something is left unexplained at `site`: a joint (1-based), or the arm as a
-/// whole, of which a touch is no part. The small gain of causes and
-/// the number of joints with causes are evidence only where `noise_is_known`: along single runs of real arms, friction
-/// has laws on all joints.
+/// whole, of which a touch is no part. The small gain of causes and the number of the arm's `joints` with causes are
+/// evidence only where `noise_is_known`: along single runs of real arms, friction has laws on all joints.
 pub(super) fn make_modest_beside_unknown(
     causes: &mut [Cause],
     site: Option<usize>,
-    noise_is_known: bool,
+    (joints, noise_is_known): (usize, bool),
 ) {
     let all: &[Cause] = causes;
-    let has_parts = noise_is_known && !scattered_joints(all).is_empty();
+    let has_parts = noise_is_known && !scattered_joints(all, joints).is_empty();
     let explained = |cause: &Cause| -> f64 {
-        let on_joint = all.iter().filter(|other| other.joint == cause.joint);
+        // Contacts and faults of the record remove nothing of what a law could explain.
+        let laws = all.iter().filter(|other| other.kind.is_a_law());
+        let on_joint = laws.filter(|other| other.joint == cause.joint);
         on_joint.map(|other| other.gain_fraction.unwrap_or(1.0)).sum()
     };
     let is_part = |cause: &Cause| {
-        let is_smaller = noise_is_known && explained(cause) < SMALLER_PART;
-        is_smaller || has_parts && is_of_few_joints(all, cause)
+        let is_smaller = noise_is_known && cause.kind.is_a_law() && explained(cause) < SMALLER_PART;
+        is_smaller || has_parts && is_of_few_joints(all, cause, joints)
     };
     let parts: Vec<bool> = all.iter().map(is_part).collect();
     for (cause, is_part) in causes.iter_mut().zip(parts) {
@@ -125,20 +125,35 @@ pub(super) fn make_modest_beside_unknown(
     }
 }
 
-/// The joints (1-based) whose laws are likely parts of one effect on the arm as a whole if something is left
-/// unexplained beside them; empty if these are fewer than [`MANY_JOINTS`].
-pub(super) fn scattered_joints(causes: &[Cause]) -> BTreeSet<usize> {
-    let scattered = causes.iter().filter(|cause| is_of_few_joints(causes, cause));
-    let joints: BTreeSet<usize> = scattered.filter_map(|cause| cause.joint).collect();
-    if joints.len() < MANY_JOINTS { BTreeSet::new() } else { joints }
+/// The joints (1-based) of an arm with this number of `joints` whose laws are likely parts of one effect on the arm as a
+/// whole if something is left unexplained beside them; empty if these are fewer than [many](many_of).
+pub(super) fn scattered_joints(causes: &[Cause], joints: usize) -> BTreeSet<usize> {
+    let scattered = causes.iter().filter(|cause| is_of_few_joints(causes, cause, joints));
+    let on: BTreeSet<usize> = scattered.filter_map(|cause| cause.joint).collect();
+    if on.len() < many_of(joints) { BTreeSet::new() } else { on }
 }
 
-/// Whether `cause` is a law on a joint, of a kind that fewer than [`MANY_JOINTS`] joints have. A kind that many joints
-/// have alike is a property of their drives that the model lacks.
-fn is_of_few_joints(causes: &[Cause], cause: &Cause) -> bool {
+/// Whether `cause` is a law on a joint, of a kind that fewer than [many](many_of) of the `joints` have. A kind that many
+/// joints have alike is a property of their drives that the model lacks.
+fn is_of_few_joints(causes: &[Cause], cause: &Cause, joints: usize) -> bool {
     let alike = causes.iter().filter(|other| other.kind == cause.kind);
-    let joints: BTreeSet<usize> = alike.filter_map(|other| other.joint).collect();
-    cause.kind.is_a_law() && cause.joint.is_some() && joints.len() < MANY_JOINTS
+    let on: BTreeSet<usize> = alike.filter_map(|other| other.joint).collect();
+    cause.kind.is_a_law() && cause.joint.is_some() && on.len() < many_of(joints)
+}
+
+/// From this many joints with causes of their own on, the causes count not as many faults but as one effect on the arm
+/// as a whole: the least number of `joints` that have faults of their own in fewer arms than a good log is given a fault
+/// by chance. With six joints this is four (0.13 % of all arms); three of them have one in 1.6 %.
+fn many_of(joints: usize) -> usize {
+    // Of the binomial distribution: of exactly `count` faults, then of fewer than `count`.
+    let (mut exactly, mut fewer) = ((1.0 - FAULTY).powi(joints as i32), 0.0);
+    let mut count = 0;
+    while count <= joints && 1.0 - fewer > FALSE_ALARM {
+        fewer += exactly;
+        exactly *= (joints - count) as f64 / (count + 1) as f64 * FAULTY / (1.0 - FAULTY);
+        count += 1;
+    }
+    count
 }
 
 impl Cause {
@@ -165,7 +180,7 @@ mod tests {
     }
 
     fn confidences(mut causes: Vec<Cause>, joint: usize, noise_is_known: bool) -> Vec<f64> {
-        make_modest_beside_unknown(&mut causes, Some(joint), noise_is_known);
+        make_modest_beside_unknown(&mut causes, Some(joint), (6, noise_is_known));
         causes.iter().map(|cause| cause.confidence).collect()
     }
 
@@ -183,11 +198,14 @@ mod tests {
     #[test]
     fn causes_on_many_joints_are_parts_of_one() {
         let causes = of_a_pendulum();
-        assert_eq!(scattered_joints(&causes), BTreeSet::from([2, 3, 5, 6]));
+        assert_eq!(scattered_joints(&causes, 6), BTreeSet::from([2, 3, 5, 6]));
         assert_eq!(confidences(causes.clone(), 4, true), [0.5, 0.5, 0.5, 0.25]);
         // A single run tells nothing about this, and three joints may each have a fault.
         assert_eq!(confidences(causes.clone(), 4, false), [0.9; 4]);
-        assert!(scattered_joints(&causes[..3]).is_empty());
+        assert!(scattered_joints(&causes[..3], 6).is_empty());
+        // Of seven joints, four have faults of their own more often, and of three hardly ever all.
+        assert!(scattered_joints(&causes, 7).is_empty());
+        assert_eq!([1, 2, 3, 4, 6, 7].map(many_of), [2, 3, 3, 4, 4, 5]);
         // But they remove less than they leave.
         assert_eq!(confidences(causes[..3].to_vec(), 5, true), [0.5; 3]);
         let faults = [6, 5, 3].map(|j| cause(Kind::TorqueGain, j, 0.6)).to_vec();
@@ -228,10 +246,10 @@ mod tests {
     #[test]
     fn beside_something_unknown_on_all_joints_no_cause_is_sure() {
         let mut causes = vec![cause(Kind::TorqueGain, 3, 0.9), cause(Kind::Stribeck, 5, 0.9)];
-        make_modest_beside_unknown(&mut causes, None, true);
+        make_modest_beside_unknown(&mut causes, None, (6, true));
         assert!(causes.iter().all(|cause| cause.confidence == 0.5), "{causes:?}");
         let mut touch = [cause(Kind::Contact, 3, 0.9)];
-        make_modest_beside_unknown(&mut touch, None, true);
+        make_modest_beside_unknown(&mut touch, None, (6, true));
         assert_eq!(touch[0].confidence, 0.9);
     }
 
@@ -245,9 +263,18 @@ mod tests {
         causes.push(cause(Kind::Stribeck, 2, 0.9));
         let record = [3, 4].map(|j| cause(Kind::VelocityLag, j, 0.9));
         causes.extend(record);
-        assert!(scattered_joints(&causes).is_empty());
+        assert!(scattered_joints(&causes, 6).is_empty());
         let expected = [0.9, 0.9, 0.9, 0.5, 0.9, 0.9, 0.5, 0.9, 0.9, 1.0, 1.0];
         assert_eq!(confidences(causes, 4, true), expected);
+    }
+
+    /// A touch of a joint says nothing for a law that leaves more than it explains.
+    #[test]
+    fn a_touch_makes_no_law_surer() {
+        let touch = Cause { gain_fraction: None, ..cause(Kind::Contact, 3, 0.0) };
+        let causes = vec![cause(Kind::Stribeck, 3, 0.3), touch];
+        assert_eq!(confidences(causes[..1].to_vec(), 5, true), [0.5]);
+        assert_eq!(confidences(causes, 5, true), [0.5, 0.9]);
     }
 
     /// The first cause removes less than a tenth of what can be explained.

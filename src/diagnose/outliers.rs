@@ -12,7 +12,6 @@ use super::data_faults::{FAR, step_s};
 use super::kind::Kind;
 use super::record::Record;
 use super::verdict::{Cause, Estimate};
-use crate::identify::Measurement;
 use crate::median::{median, sigma_of_changes};
 use crate::robot::JointSignals;
 use crate::signal::resolution;
@@ -51,7 +50,7 @@ impl Strays {
         self.rows.len() >= FEWEST
     }
 
-    fn in_words(&self, time_s: &[f64]) -> String {
+    pub(super) fn in_words(&self, time_s: &[f64]) -> String {
         let Self { joint, channel, rows } = self;
         let first_s = rows.first().and_then(|row| time_s.get(*row)).unwrap_or(&0.0);
         let values = if rows.len() == 1 { "value" } else { "values" };
@@ -73,16 +72,6 @@ pub fn mend(record: &mut Record) -> Vec<Strays> {
 /// Remarks for the user about wild readings that are too few to be a fault of their channel.
 pub fn accidents(strays: &[Strays], time_s: &[f64]) -> Vec<String> {
     strays.iter().filter(|few| !few.are_many()).map(|few| few.in_words(time_s)).collect()
-}
-
-/// The channels of `m` with wild readings replaced, and a remark for the user about every channel that has any. `None`
-/// for a log without wild readings.
-pub fn without_wild_readings(m: &Measurement) -> Option<([JointSignals; 3], Vec<String>)> {
-    let mut record = Record::without_rows(m, &[]);
-    let strays = mend(&mut record);
-    let remarks = strays.iter().map(|strays| strays.in_words(m.time_s)).collect();
-    let Record { q_rad, qd_rad_s, torque_nm, .. } = record;
-    (!strays.is_empty()).then_some(([q_rad, qd_rad_s, torque_nm], remarks))
 }
 
 /// Replaces wild torques by the median of nine.

@@ -56,7 +56,9 @@ impl Diagnosis {
     fn about_causes(&self, laws: &[Option<usize>]) -> Vec<String> {
         let is_left = self.unexplained.is_some() && self.noise_floor_nm.is_some();
         let mut out: Vec<String> = Vec::new();
-        out.extend(is_left.then(|| missing_effect(&self.causes)).flatten());
+        out.extend(
+            is_left.then(|| missing_effect(&self.causes, self.before.rms_nm.len())).flatten(),
+        );
         out.extend(told::overview(&self.causes));
         out.extend(told::in_sentences(&self.causes, self.noise_floor_nm.is_some()));
         if let Some(unexplained) = &self.unexplained {
@@ -168,9 +170,10 @@ impl Unexplained {
     }
 }
 
-/// The sentence about `causes` that are spread over many joints, for a log that shows something unexplained.
-fn missing_effect(causes: &[Cause]) -> Option<String> {
-    let joints: Vec<String> = scattered_joints(causes).iter().map(usize::to_string).collect();
+/// The sentence about `causes` that are spread over many of the arm's `joints`, for a log that shows something unexplained.
+fn missing_effect(causes: &[Cause], joints: usize) -> Option<String> {
+    let joints: Vec<String> =
+        scattered_joints(causes, joints).iter().map(usize::to_string).collect();
     (!joints.is_empty()).then(|| {
         format!(
             "Something that acts on the arm as a whole is likely missing from the dictionary: joints {} have causes of their own, and \
@@ -424,8 +427,8 @@ mod tests {
         let kinds = [Kind::Stribeck, Kind::TorqueGain, Kind::Ripple, Kind::Spring];
         let of_joint = |(j, kind)| Cause::certain(kind, Some(j), "an effect", 9.0, &[]);
         let causes: Vec<Cause> = kinds.into_iter().enumerate().map(of_joint).collect();
-        let said = missing_effect(&causes).unwrap();
+        let said = missing_effect(&causes, 6).unwrap();
         assert!(said.contains("joints 1, 2, 3, 4 have causes of their own"), "{said}");
-        assert_eq!(missing_effect(&causes[1..]), None);
+        assert_eq!(missing_effect(&causes[1..], 6), None);
     }
 }

@@ -336,7 +336,7 @@ pub enum Verdict {
     NothingFound,
     /// Causes named; nothing is left but what their laws leave because they are not exact.
     CauseNamed,
-    /// Something is left that no family explains.
+    /// Something is left that no family explains, or a second log differs by more than a body on the flange.
     Unexplained,
     /// No arm has the base parameters that were identified.
     Contradicted,
@@ -363,8 +363,8 @@ impl Diagnosis {
     /// arm, behind a doubt whether it is this arm; what chance explains comes behind the causes.
     pub fn add_payload(&mut self, payload: PayloadFinding) {
         let cause = payload.cause();
-        if let (Verdict::NothingFound, Some(_)) = (self.verdict, &cause) {
-            self.verdict = Verdict::CauseNamed;
+        if self.verdict == Verdict::NothingFound && payload.differs() {
+            self.verdict = if cause.is_some() { Verdict::CauseNamed } else { Verdict::Unexplained };
             let nothing_found = self.nothing_found();
             self.sentences.retain(|sentence| *sentence != nothing_found);
         }

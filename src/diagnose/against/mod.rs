@@ -168,18 +168,15 @@ pub fn explain(
     let places = places(&changes);
     let nuisance = nuisance(study, &unknown, beside.iter());
     let mut search = Search { study, changes, images, places, unknown, nuisance, residual };
-    let mut taken = search.select();
-    if taken.iter().any(|c| search.changes[*c].secants.is_some()) {
-        let prepared = &study.regression.prepared;
-        search.set_to_size(&taken, theta, |theta| Scene::new(arm, set, theta, prepared));
-        taken = search.select();
-    }
+    let prepared = &study.regression.prepared;
+    let scene = |theta: &[f64]| Scene::new(arm, set, theta, prepared);
+    let mut taken = search.select_at_size(theta, &scene);
     // An accepted effect may have been the part of a change that the null model could not absorb.
     while let Some(needless) = (0..beside.len()).find(|&e| !search.needs(e, &beside, &taken)) {
         let entry = beside.remove(needless).entry;
         judged.push((study.families[entry.family].kind(), entry.site.map(|j| j + 1)));
         search.nuisance = self::nuisance(study, &search.unknown, beside.iter());
-        taken = search.select();
+        taken = search.select_at_size(theta, &scene);
     }
     let mut span = study.span_of_all(&beside.iter().map(|b| b.entry).collect::<Vec<_>>());
     let images = taken.iter().flat_map(|&c| &search.changes[c].images);

@@ -26,6 +26,8 @@ const SIZING: usize = 2;
 const MOST_CHANGES: usize = 8;
 /// Rounds in which one change is added and others are removed; bounded because two may replace each other for ever.
 const ROUNDS: usize = 2 * MOST_CHANGES;
+/// Most selections after the changes were set to their size: they could take turns for ever.
+const RESELECTIONS: usize = 3;
 /// Number of alternatives that are reported.
 const RIVALS: usize = 5;
 
@@ -147,16 +149,33 @@ impl Search<'_> {
         taken
     }
 
+    /// Selects changes, sets them to their size, and selects again as long as others are taken then: their columns are
+    /// still those of small changes.
+    pub(super) fn select_at_size(
+        &mut self,
+        theta: &[f64],
+        scene: &impl Fn(&[f64]) -> Scene,
+    ) -> Vec<usize> {
+        let mut taken = self.select();
+        for _ in 0..RESELECTIONS {
+            if taken.iter().all(|c| self.changes[*c].secants.is_none()) {
+                break;
+            }
+            self.set_to_size(&taken, theta, scene);
+            let again = self.select();
+            if again == taken {
+                break;
+            }
+            taken = again;
+        }
+        taken
+    }
+
     /// Replaces the columns of the changes `taken`, which are those of small changes of the identified arm, by those of
     /// their size in the arm of the simulation with the base parameters `theta`: the identified one has taken most of a
     /// change up already. What the other changes add to the parameters counts: a zero that is off is felt the more, the
     /// more the flange carries. `scene` is the scene of an arm with given base parameters.
-    pub(super) fn set_to_size(
-        &mut self,
-        taken: &[usize],
-        theta: &[f64],
-        scene: impl Fn(&[f64]) -> Scene,
-    ) {
+    fn set_to_size(&mut self, taken: &[usize], theta: &[f64], scene: &impl Fn(&[f64]) -> Scene) {
         for _ in 0..SIZING {
             for (index, &c) in taken.iter().enumerate() {
                 let Some(secants) = &self.changes[c].secants else { continue };

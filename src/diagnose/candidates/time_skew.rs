@@ -58,9 +58,9 @@ impl Candidate for TimeSkew {
     }
 
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
-        // A row is recorded at one time. In a single run, the torque of one joint that seems late is friction that
-        // builds up after its reversals.
-        if site.is_some() && !scene.periodic {
+        // A row is recorded at one time. In a single run, the torque of one joint of several that seems late is
+        // friction that builds up after its reversals.
+        if site.is_some() && scene.joints() > 1 && !scene.periodic {
             return Vec::new();
         }
         DELAYS_S.map(|value| Shape { variant: 0, value }).to_vec()
