@@ -176,8 +176,9 @@ enum Target {
 impl Target {
     fn find(path: &Path) -> Result<Self, OutputError> {
         let fault = |e| OutputError::new(path, e);
-        // Links are followed one by one: the name of an open file is a link too, but to the file behind it, and the last
-        // link may lead to a file that does not exist yet. In a circle of links the last one remains, and is refused.
+        // Links are followed one by one: the name of an open file is a link too, but to the file behind it, and the
+        // last link may lead to a file that does not exist yet. In a circle of links the last one remains, and is
+        // refused.
         let mut end = path.to_owned();
         for _ in 0..LINKS {
             if let Some(open) = Self::of_open_file(&end) {
@@ -209,8 +210,8 @@ impl Target {
         }
     }
 
-    /// What `path` leads to if it names an open file by its number, such as `/dev/fd/1` or `/proc/self/fd/1`, or anything
-    /// else of the system in `/proc`. The rest of `/dev` is told by its kind: `/dev/shm` holds regular files.
+    /// What `path` leads to if it names an open file by its number, such as `/dev/fd/1` or `/proc/self/fd/1`, or
+    /// anything else of the system in `/proc`. The rest of `/dev` is told by its kind: `/dev/shm` holds regular files.
     fn of_open_file(path: &Path) -> Option<Self> {
         let folder = fs::canonicalize(folder_of(path)).ok()?;
         let own = fs::canonicalize("/proc/self/fd").ok();

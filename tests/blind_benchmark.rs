@@ -180,9 +180,9 @@ fn plan_of(seed: u64) -> BlindPlan {
     }
 }
 
-/// A longer link whose family is not in the dictionary, in coloured noise: neither a curve of one joint nor the curves of
-/// all joints along one quantity tell what the gain and the spring of joint 3 leave, but base parameters do that each
-/// joint has for itself.
+/// A longer link whose family is not in the dictionary, in coloured noise: neither a curve of one joint nor the curves
+/// of all joints along one quantity tell what the gain and the spring of joint 3 leave, but base parameters do that
+/// each joint has for itself.
 #[test]
 fn joints_that_do_not_share_their_parameters() {
     let plan = BlindPlan { shares: WITHHELD, sqrt_lambda: [15.0, 60.0], ..plan_of(5501) };

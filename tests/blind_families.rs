@@ -464,8 +464,9 @@ fn friction_that_multiplies_other_friction() {
     }
 }
 
-/// A wide Stribeck curve and concave friction stand for each other so well that nothing is left to explain. Where the law
-/// of the arm is not in the dictionary, the other may be named, but not for certain; where both are, the right one is.
+/// A wide Stribeck curve and concave friction stand for each other so well that nothing is left to explain. Where the
+/// law of the arm is not in the dictionary, the other may be named, but not for certain; where both are, the right one
+/// is.
 #[test]
 fn what_other_laws_imitate_is_not_named_for_certain() {
     let stribeck = "kind = \"stribeck\"\nextra_nm = 2.2\nvs_rad_s = 0.26";
@@ -485,8 +486,8 @@ fn what_other_laws_imitate_is_not_named_for_certain() {
 }
 
 /// A link that is longer than the model says does to one joint what it does not do to the others. Where lengths and
-/// gravity are not in the dictionary, a spring and the gain of a drive explain most of that on joint 3, and no joint shows
-/// the rest by itself.
+/// gravity are not in the dictionary, a spring and the gain of a drive explain most of that on joint 3, and no joint
+/// shows the rest by itself.
 #[test]
 fn what_acts_on_the_whole_arm_is_not_silently_the_fault_of_a_joint() {
     let toml = "[[effect]]\nkind = \"link_length\"\njoint = 3\nerror_m = 0.009\n";

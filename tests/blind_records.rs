@@ -78,8 +78,8 @@ fn without_run_in(log: &mut Measured) {
 /// neither the scatter between periods nor the samples that are kept show the rounding.
 #[test]
 fn coarse_angles_of_a_fast_log_are_no_fault() {
-    // Of finer steps, the fastest harmonics show motion as well; and without its run-in, the log begins and ends amid the
-    // motion, where the low-pass does not know how it goes on.
+    // Of finer steps, the fastest harmonics show motion as well; and without its run-in, the log begins and ends amid
+    // the motion, where the low-pass does not know how it goes on.
     for (seed, step_rad, is_cut) in [(312, 5e-5, false), (314, 1e-5, true)] {
         let rounded = format!("{TORQUE_NOISE}q_step_rad = {step_rad}\n");
         let diagnosis = diagnose(seed, (&rounded, FAST), |log, rng| {

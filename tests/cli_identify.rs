@@ -192,8 +192,8 @@ fn a_wild_torque_reading_does_no_harm() {
     let said = ["1 single value of the torque of joint 2", "Identified 52"];
     let mended = identified(&folder, "wild.csv", &said);
     for ([value, sigma], [again, sigma_again]) in clean.into_iter().zip(mended) {
-        // The median of its neighbours is off from the reading by about σ of the noise. One of 5000 rows moves a parameter
-        // by σ/√5000 = 0.014 of its own σ, and one with fifty times the usual weight by 0.1.
+        // The median of its neighbours is off from the reading by about σ of the noise. One of 5000 rows moves a
+        // parameter by σ/√5000 = 0.014 of its own σ, and one with fifty times the usual weight by 0.1.
         assert!((again - value).abs() < 0.1 * sigma, "{value} and {again} ± {sigma}");
         assert!((sigma_again / sigma - 1.0).abs() < 0.02, "{sigma} and {sigma_again}");
     }

@@ -35,8 +35,8 @@ use End::{Answer, NoMotion, NoTorque, Open, TooShort, TooSlow, Unread};
 
 /// Expected end for each damage: where the period is searched for, and where the log is treated as a single run. Rows
 /// that contradict the rows before them are set aside, so that too little remains of columns that are exchanged. Where
-/// angles and velocities are related by a wrong factor throughout, such as −1, the reader says so. Half of the log, and the part on one side of a pause, has two periods, too few because their σ needs
-/// six seconds of data.
+/// angles and velocities are related by a wrong factor throughout, such as −1, the reader says so. Half of the log, and
+/// the part on one side of a pause, has two periods, too few because their σ needs six seconds of data.
 const ENDS: &[(&str, [End; 2])] = &[
     ("nothing", [Answer, Answer]),
     ("an angle for its velocity", [TooShort, TooShort]),
@@ -193,11 +193,26 @@ fn assert_numbers(found: &Identification) {
 }
 
 fn assert_numbers_of(diagnosis: &Diagnosis) {
+    let is_probability = |value: &f64| (0.0..=1.0).contains(value);
     let rms_nm = diagnosis.before.rms_nm.iter().chain(&diagnosis.after.rms_nm);
     let base = diagnosis.base_parameters.iter().map(|parameter| &parameter.value);
     assert!(rms_nm.chain(base).all(|value| value.is_finite()), "{diagnosis:?}");
+    let lack_of_fit = diagnosis.lack_of_fit_probability;
+    assert!(lack_of_fit.iter().all(is_probability), "{lack_of_fit:?}");
+    for left in diagnosis.unexplained.iter().chain(&diagnosis.form_error) {
+        let mut numbers = left.curve.iter().flatten().chain([&left.rms_nm]);
+        assert!(numbers.all(|value| value.is_finite()), "{left:?}");
+    }
+    for limit in &diagnosis.detection_limits {
+        let mut numbers = limit.value.iter().chain(&limit.sqrt_lambda).chain(limit.given.values());
+        assert!(numbers.all(|value| value.is_finite()), "{limit:?}");
+        assert!(is_probability(&limit.power), "{limit:?}");
+    }
     for cause in &diagnosis.causes {
-        assert!((0.0..=1.0).contains(&cause.confidence), "{cause:?}");
+        assert!(is_probability(&cause.confidence), "{cause:?}");
+        // A fault of the record that is counted, not compared with noise, has an infinite strength.
+        let most = if cause.kind.is_of_the_record() { f64::INFINITY } else { f64::MAX };
+        assert!((0.0..=most).contains(&cause.strength), "{cause:?}");
         let estimates = cause.parameters.values();
         let mut numbers = estimates.flat_map(|e| [e.value, e.ci95[0], e.ci95[1]]);
         assert!(numbers.all(f64::is_finite), "{cause:?}");

@@ -108,8 +108,8 @@ fn a_law_that_is_not_exact_is_the_law_all_the_same() {
     assert!(found.diagnosis.sentences.iter().any(|sentence| sentence.starts_with(said)));
 }
 
-/// Joints with a twelfth of their rotors' inertia stick before they turn round, and move between two samples as their drives
-/// let them. A guess of what these give once made concave viscous friction of a Stribeck curve.
+/// Joints with a twelfth of their rotors' inertia stick before they turn round, and move between two samples as their
+/// drives let them. A guess of what these give once made concave viscous friction of a Stribeck curve.
 #[test]
 fn a_light_joint_that_sticks_has_a_stribeck_curve() {
     let curve = "[plant]\ncontrol_rate_hz = 4000.0\nstep_s = 0.00025\n\
@@ -148,8 +148,8 @@ fn damped(stiffness_per_rad: f64, damping_s: f64) -> Law {
     Law::LuGre { stiffness_per_rad, damping_s, extra_nm: 0.0, vs_rad_s: 1.0 }
 }
 
-/// A LuGre model whose bristles hold a Stribeck curve. As two laws side by side, the Coulomb friction came out too large
-/// by most of the curve, and the curve too small.
+/// A LuGre model whose bristles hold a Stribeck curve. As two laws side by side, the Coulomb friction came out too
+/// large by most of the curve, and the curve too small.
 #[test]
 fn bristles_hold_a_stribeck_curve() {
     for (h, damping_s, seed) in [(3, 0.0, 31), (4, 0.002, 32)] {
@@ -176,8 +176,8 @@ fn bristles_hold_a_stribeck_curve() {
     }
 }
 
-/// Bristles that build up otherwise than in the law are no curve beside it: what they leave is said to be unexplained, and
-/// to depend on the way since the reversal.
+/// Bristles that build up otherwise than in the law are no curve beside it: what they leave is said to be unexplained,
+/// and to depend on the way since the reversal.
 #[test]
 fn bristles_of_other_exponents_have_no_stribeck_curve() {
     for (h, exponent, seed) in [(3, 0.5, 41), (3, 1.5, 42), (4, 2.0, 43), (2, 1.5, 44)] {
@@ -202,7 +202,8 @@ fn presliding_of_damped_bristles() {
     assert_eq!(cause.form, Some("damped bristles"));
 }
 
-/// Damping that the log does not show (1.5 of its standard error) moves the stiffness by more than the noise alone would allow.
+/// Damping that the log does not show (1.5 of its standard error) moves the stiffness by more than the noise alone
+/// would allow.
 #[test]
 fn presliding_of_hardly_damped_bristles() {
     let law = damped(600.0, 0.0007);
@@ -266,8 +267,8 @@ fn a_torque_that_went_through_a_low_pass() {
     assert!(cause.form.is_some_and(|form| form.contains("low-pass")), "{:?}", cause.form);
 }
 
-/// The load of the gear of joint 2 depends on its rotor, whose inertia the motion adds to that of the links. Friction that
-/// grows with the load tells it: with the rotor of the file, or none, mu would be off by many σ.
+/// The load of the gear of joint 2 depends on its rotor, whose inertia the motion adds to that of the links. Friction
+/// that grows with the load tells it: with the rotor of the file, or none, mu would be off by many σ.
 #[test]
 fn load_friction_of_a_gear_with_another_rotor() {
     let rotor_kg_m2 = Arm::built_in("ur5").unwrap().joints[1].drive.rotor_inertia_kg_m2;

@@ -50,8 +50,9 @@ fn run(tables: &[&str], reference: &dyn Reference) -> Recording {
     plant(tables).unwrap().run(reference, None).unwrap()
 }
 
-/// Every kind of effect with a size that a log shows and, where it exists, with a size that has no effect.
-const KINDS: [(&str, Option<&str>); 28] = [
+/// Every kind of effect, in the order of [`Effect::KINDS`], with a size that a log shows and, where it exists, with a
+/// size that has no effect.
+const KINDS: [(&str, Option<&str>); 29] = [
     (
         "kind='stribeck'\njoint=4\nextra_nm=0.5\nvs_rad_s=0.1",
         Some("kind='stribeck'\njoint=4\nextra_nm=0\nvs_rad_s=0.1"),
@@ -94,6 +95,10 @@ const KINDS: [(&str, Option<&str>); 28] = [
         Some("kind='current_offset'\njoint=3\noffset_nm=0"),
     ),
     ("kind='saturation'\njoint=2\nlimit_nm=40", Some("kind='saturation'\njoint=2\nlimit_nm=1000")),
+    (
+        "kind='feed_forward'\njoint=6\nshare_less=0.5",
+        Some("kind='feed_forward'\njoint=6\nshare_less=0"),
+    ),
     (
         "kind='spring'\njoint=4\nstiffness_nm_rad=1\nrest_rad=0.2",
         Some("kind='spring'\njoint=4\nstiffness_nm_rad=0\nrest_rad=0.2"),
@@ -152,6 +157,17 @@ fn log(tables: &[&str]) -> Measured {
 fn without_effects_the_plant_is_the_plain_one_to_the_bit() {
     let plain = Plant::new(&ur5(), &PlantConfig::default()).unwrap().run(&lively(), None).unwrap();
     assert_eq!(run(&[], &lively()), plain);
+}
+
+#[test]
+fn no_kind_of_effect_is_left_out() {
+    let of = |tables: &[&str]| -> Vec<&'static str> {
+        effects(tables).iter().map(Effect::kind).collect()
+    };
+    assert_eq!(of(&KINDS.map(|(effect, _)| effect)), Effect::KINDS);
+    for (effect, nothing) in KINDS {
+        assert!(nothing.is_none_or(|nothing| of(&[nothing]) == of(&[effect])), "{nothing:?}");
+    }
 }
 
 #[test]

@@ -42,8 +42,8 @@ fn identified(
     (alone, whole)
 }
 
-/// Two and a half seconds more than a period do not repeat. The rows of the other log, a mean over four periods, scatter less
-/// than filtered ones: weighted together they have to be filtered as well.
+/// Two and a half seconds more than a period do not repeat. The rows of the other log, a mean over four periods,
+/// scatter less than filtered ones: weighted together they have to be filtered as well.
 #[test]
 fn a_log_beside_a_single_run_counts_as_one() {
     let simulation = simulation("ur5_identification", 1.0, "");
@@ -147,8 +147,8 @@ fn logs_of_an_arm_that_was_loaded_between_them_do_not_agree() {
     assert!(!name.starts_with('r') && !name.starts_with("Ia"), "{name}");
 }
 
-/// A run of 14 minutes is thinned behind its low-pass, one of 40 s is not: together they have the rows of the longer one's
-/// rate.
+/// A run of 14 minutes is thinned behind its low-pass, one of 40 s is not: together they have the rows of the longer
+/// one's rate.
 #[test]
 fn a_long_run_and_a_short_one_are_used_together() {
     let simulation = simulation("ur5_identification", 1.0, "");

@@ -70,8 +70,8 @@ fn a_fast_log() {
     assert_calibrated(&fast);
 }
 
-/// Angles in steps of 0.2 mrad without any noise round alike in every period: no scatter shows it, nor, behind the low-pass
-/// of a decimator, do the samples.
+/// Angles in steps of 0.2 mrad without any noise round alike in every period: no scatter shows it, nor, behind the
+/// low-pass of a decimator, do the samples.
 #[test]
 fn a_fast_log_of_angles_that_round_alike() {
     let fast = format!("{}\n[plant]\nlog_rate_hz = 500.0\n", include_str!("../sims/default.toml"));

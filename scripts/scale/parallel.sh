@@ -4,4 +4,6 @@
 set -eu
 scale=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$OUT"
-seq 0 $((SHARDS - 1)) | parallel --retries 3 --halt never "$@" "$scale/shard.sh" {}
+# Other machines get neither the environment that describes the run nor the folder in which it was started, unless told.
+seq 0 $((SHARDS - 1)) | parallel --retries 3 --halt never --workdir . \
+  --env SCENARIO --env TRIALS --env SHARDS --env OUT --env MONTECARLO "$@" "$scale/shard.sh" {}

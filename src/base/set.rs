@@ -78,8 +78,8 @@ pub struct AmbiguousRank {
 const DEPENDENT_BELOW: f64 = 1e-10;
 /// Relative distance above which a column is independent. Between the two thresholds the answer would be a guess.
 const INDEPENDENT_ABOVE: f64 = 1e-7;
-/// Relative distance below which an independent column hangs on digits: arms whose axes are neither parallel nor at right
-/// angles have 0.1 and more, 1.57 in place of π/2 gives 1e-3.
+/// Relative distance below which an independent column hangs on digits: arms whose axes are neither parallel nor at
+/// right angles have 0.1 and more, 1.57 in place of π/2 gives 1e-3.
 const NEARLY_DEPENDENT_BELOW: f64 = 2e-3;
 /// Number of random states, with one row per joint each: far more rows than columns.
 const STATES: usize = 200;

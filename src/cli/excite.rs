@@ -50,8 +50,8 @@ pub struct ExciteArgs {
     /// Let the base frequency be free, with periods between these, s: LOW,HIGH.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1)]
     period_range: Option<Vec<f64>>,
-    /// Centres of the joints' motions (the constant terms of their series), rad: `free`, which is the default, or a number
-    /// for each joint, such as 0,-1.5708,0,0,0,free.
+    /// Centres of the joints' motions (the constant terms of their series), rad: `free`, which is the default, or a
+    /// number for each joint, such as 0,-1.5708,0,0,0,free.
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     offsets: Option<String>,
     /// Start and end every period at rest.
@@ -106,8 +106,8 @@ pub struct ExciteArgs {
     /// Program for a Universal Robots controller.
     #[arg(long, value_name = "FILE.script")]
     urscript: Option<PathBuf>,
-    /// Speed of what --csv and --urscript write, as a fraction of the designed one: the same path, played more slowly. In
-    /// the URScript it is the line `speed = …`.
+    /// Speed of what --csv and --urscript write, as a fraction of the designed one: the same path, played more slowly.
+    /// In the URScript it is the line `speed = …`.
     #[arg(long, value_name = "0.01…1", default_value_t = 1.0, requires = "played")]
     speed: f64,
     /// Report page.

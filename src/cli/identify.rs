@@ -54,8 +54,8 @@ pub struct IdentifyArgs {
     /// How deviations from the robot file's values are measured for parameters that the data do not decide.
     #[arg(long, requires = "physical", value_enum, default_value = "pull_back")]
     prior: PriorMetric,
-    /// Weight of the robot file's values: 1/s² treats them as known to a relative σ of s (1: to 100 %; 100: to 10 %), auto
-    /// takes the weight that predicts left-out periods best.
+    /// Weight of the robot file's values: 1/s² treats them as known to a relative σ of s (1: to 100 %; 100: to 10 %),
+    /// auto takes the weight that predicts left-out periods best.
     #[arg(long, requires = "physical", default_value_t)]
     prior_weight: PriorWeight,
     /// Write the result as JSON.
@@ -82,8 +82,8 @@ pub struct SourceArgs {
 /// How logs are processed.
 #[derive(Debug, Args)]
 pub struct ProcessingArgs {
-    /// Cut-off of the low-pass on torque and regressor of a single run, Hz [default: 10]. A motion that repeats needs no
-    /// low-pass.
+    /// Cut-off of the low-pass on torque and regressor of a single run, Hz [default: 10]. A motion that repeats needs
+    /// no low-pass.
     #[arg(long = "cutoff", value_name = "HZ")]
     cutoff_hz: Option<f64>,
     /// Rate to which the log is resampled, Hz. Default: its own, but logs above 300 Hz are decimated to 150 to 300 Hz.

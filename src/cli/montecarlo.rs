@@ -185,8 +185,8 @@ fn run_trials(args: &RunArgs) -> CommandResult {
     }
 }
 
-/// The file of the shard with the trials `range`, in `folder`, which is created. Refuses a file that exists already without
-/// --resume, that cannot be written, or that is another output as well.
+/// The file of the shard with the trials `range`, in `folder`, which is created. Refuses a file that exists already
+/// without --resume, that cannot be written, or that is another output as well.
 fn shard_file(
     args: &RunArgs,
     folder: &Path,

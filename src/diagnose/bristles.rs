@@ -1,13 +1,13 @@
-//! Bristles behind the reversals of a joint: how far they are bent along a motion, and what the samples of a log show of
-//! it.
+//! Bristles behind the reversals of a joint: how far they are bent along a motion, and what the samples of a log show
+//! of it.
 //!
-//! A bristle that is bent by z gives the friction F z, dz/dq = k (1 − z sign q̇/γ). It comes to rest at z = ±γ. With γ = 1
-//! it is Dahl's (1968), with the Stribeck curve γ(q̇) = 1 + e s(|q̇|) that of the LuGre model (Canudas de Wit et al. 1995);
-//! damping adds F T dz/dt.
+//! A bristle that is bent by z gives the friction F z, dz/dq = k (1 − z sign q̇/γ). It comes to rest at z = ±γ. With
+//! γ = 1 it is Dahl's (1968), with the Stribeck curve γ(q̇) = 1 + e s(|q̇|) that of the LuGre model (Canudas de Wit et
+//! al. 1995); damping adds F T dz/dt.
 //!
-//! z is propagated exactly along the motion. Over a stretch of length Δ in one direction s, z ← γ s + (z − γ s) e^{−kΔ/γ},
-//! with γ at the mean speed of the stretch; a step within which the velocity reverses consists of two such stretches.
-//! Over a periodic motion, z is carried round until it repeats as well.
+//! z is propagated exactly along the motion. Over a stretch of length Δ in one direction s,
+//! z ← γ s + (z − γ s) e^{−kΔ/γ}, with γ at the mean speed of the stretch; a step within which the velocity reverses
+//! consists of two such stretches. Over a periodic motion, z is carried round until it repeats as well.
 
 use super::candidates::Shape;
 use super::candidates::stribeck::near_rest;

@@ -22,9 +22,10 @@ pub(super) const CONTACT_WHERE_MOVED: f64 = 0.02;
 /// that it follows on all of them, are two more tests with the same share.
 pub(super) const UNEXPLAINED: f64 = 0.1 / 3.0 * FALSE_ALARM;
 /// The same beside a law that was named. In a log without faults a law is named by chance, and that is a false alarm
-/// already: what is said to be left beside it adds none, and [`FALSE_ALARM`] stays what it is. Where the law is there, four
-/// tests of this level (joints that each have parameters of their own are tried only here) say by chance in 0.16 % of logs
-/// that something is left. That costs a doubt; what it is paid for is names that are not all there is to be said.
+/// already: what is said to be left beside it adds none, and [`FALSE_ALARM`] stays what it is. Where the law is there,
+/// four tests of this level (joints that each have parameters of their own are tried only here) say by chance in 0.16 %
+/// of logs that something is left. That costs a doubt; what it is paid for is names that are not all there is to be
+/// said.
 pub(super) const UNEXPLAINED_BESIDE_A_LAW: f64 = (3.0 * UNEXPLAINED + LAW) / 4.0;
 
 /// A body on the flange between two logs. It is a test of its own, made only on request, with a false-alarm probability

@@ -1,9 +1,9 @@
 //! Least squares over several logs. Joints are weighted by their residual; the covariance comes from the scatter of
 //! block sums, which is valid for residuals whose correlation time is short against a block.
 //!
-//! x̂ = A⁻¹ Σ Xᵀy/s_j², A = Σ XᵀX/s_j² = L Lᵀ, V = A⁻¹ (Σ_b g̃_b g̃_bᵀ) A⁻¹, where g_b is the sum of Xᵀe/s_j² over block
-//! b, S_b that of XᵀX/s_j², T_b = L⁻¹ S_b L⁻ᵀ, and g̃_b = L (1 − T_b)^(−½) L⁻¹ g_b makes up for the adaptation of the
-//! fit to its block, as in [`BlockCluster`](crate::identify::covariance::BlockCluster).
+//! x̂ = A⁻¹ Σ Xᵀy/s_j², A = Σ XᵀX/s_j² = L Lᵀ, V = A⁻¹ (Σ_b g̃_b g̃_bᵀ) A⁻¹, where g_b is the sum of Xᵀe/s_j² over
+//! block b, S_b that of XᵀX/s_j², T_b = L⁻¹ S_b L⁻ᵀ, and g̃_b = L (1 − T_b)^(−½) L⁻¹ g_b makes up for the adaptation of
+//! the fit to its block, as in [`BlockCluster`](crate::identify::covariance::BlockCluster).
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -96,8 +96,8 @@ pub(super) fn solve(
     Ok(Solution { x, covariance, blocks })
 }
 
-/// L⁻ᵀ of a Gram matrix A = L Lᵀ, so that A⁻¹ = L⁻ᵀ L⁻¹. A is scaled to a unit diagonal first because its columns differ
-/// in size. Rows and columns of unknowns without a column are zero.
+/// L⁻ᵀ of a Gram matrix A = L Lᵀ, so that A⁻¹ = L⁻ᵀ L⁻¹. A is scaled to a unit diagonal first because its columns
+/// differ in size. Rows and columns of unknowns without a column are zero.
 fn inverse_root(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = gram.nrows();
     let scale: Vec<f64> = (0..n)

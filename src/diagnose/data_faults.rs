@@ -10,7 +10,7 @@
 use super::kind::Kind;
 use super::outliers;
 use super::record::Record;
-use super::stale;
+use super::stale::{self, StaleReadings};
 use super::stalls::stalls;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
@@ -94,7 +94,7 @@ const SHORT_HANG: f64 = 0.1;
 /// unreliable joints (0-based).
 fn without_hanging_torques(
     record: &mut Record,
-    stale: &stale::Found,
+    stale: &StaleReadings,
     single_run: bool,
 ) -> Result<(Option<String>, Vec<usize>), SignalError> {
     let filled = |record: &mut Record| if single_run { Ok(None) } else { record.fill_gaps() };
@@ -113,7 +113,8 @@ fn without_hanging_torques(
 }
 
 /// Least σ of a lag, in samples: how well means over four steps tell it where velocities carry no noise, as those that
-/// are differences of the recorded angles. A lag of 4.33 samples, hidden with little noise, came out 1e-3 samples short.
+/// are differences of the recorded angles. A lag of 4.33 samples, hidden with little noise, came out 1e-3 samples
+/// short.
 const LEAST_SIGMA_SAMPLES: f64 = 1e-3;
 
 /// Velocity channels that lag behind the angle: one cause for all joints if they share one lag, otherwise one per
@@ -235,8 +236,8 @@ pub fn coarse_joints(faults: &[Cause]) -> Vec<usize> {
     faults.iter().filter(coarse).filter_map(|f| f.joint).map(|j| j - 1).collect()
 }
 
-/// Least share of the rows whose torque is on a grid that counts as coarse. Readings that are wild, or hang, need not be
-/// on it.
+/// Least share of the rows whose torque is on a grid that counts as coarse. Readings that are wild, or hang, need not
+/// be on it.
 const ON_GRID: f64 = 0.9;
 
 /// Torques that were `recorded` as whole multiples of a step that is coarse compared with the changes from sample to

@@ -43,10 +43,10 @@ pub(super) fn with_reach(
 mod tests {
     use super::*;
 
-    /// The product a b and the angle α of two numbers: d(ab)/da = b, dα/da = −b/(a² + b²), dα/db = a/(a² + b²). One of them
-    /// is free, at first where the angle lies at the cut of atan2; then both, given the other way round, with variances of
-    /// 0.04 (b) and 0.09 (a) and a covariance of 0.03. The error of the central difference is of the order of the step
-    /// squared, 1e-6.
+    /// The product a b and the angle α of two numbers: d(ab)/da = b, dα/da = −b/(a² + b²), dα/db = a/(a² + b²). One of
+    /// them is free, at first where the angle lies at the cut of atan2; then both, given the other way round, with
+    /// variances of 0.04 (b) and 0.09 (a) and a covariance of 0.03. The error of the central difference is of the order
+    /// of the step squared, 1e-6.
     #[test]
     fn only_what_is_free_makes_an_interval() {
         let quantity = |name, value, unit| Quantity { name, value, unit };

@@ -14,7 +14,7 @@ use super::held_out::{Models, Validation, held_out_gain};
 use super::image::{Image, Span};
 use super::intervals;
 use super::kind::Kind;
-use super::misfit::{self, Known, Left};
+use super::misfit::{self, KnownOfJoints, Left};
 use super::modesty::{make_modest, make_modest_beside_unknown};
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
@@ -234,8 +234,8 @@ impl<'a> Diagnoser<'a> {
     }
 }
 
-/// Orders the causes. For a repeating motion: faults of the record before physics, physics by strength. For a single
-/// run the cause with the largest gain comes first, and faults that concern only the recording come last.
+/// Orders the causes; `faults` are those of the record and contacts. For a repeating motion: faults of the record, then
+/// contacts, then physics by strength. For a single run: contacts, then physics by gain, then faults of the record.
 fn in_order(mut faults: Vec<Cause>, mut physics: Vec<Cause>, periodic: bool) -> Vec<Cause> {
     physics.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     if !periodic {
@@ -246,8 +246,8 @@ fn in_order(mut faults: Vec<Cause>, mut physics: Vec<Cause>, periodic: bool) -> 
     faults.into_iter().chain(physics).collect()
 }
 
-/// Contacts with the arm: those that the comparison of repetitions shows, or those in what the model leaves along a single
-/// run.
+/// Contacts with the arm: those that the comparison of repetitions shows, or those in what the model leaves along a
+/// single run.
 fn touches(
     log: &Cleaned,
     study: &Study,
@@ -299,8 +299,8 @@ fn is_a_tear(cause: &Cause, m: &Measurement) -> bool {
     cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
 }
 
-/// What the residual `rest` shows that the `accepted` causes leave; their laws may leave λ of `form` on each joint because
-/// they are not exact.
+/// What the residual `rest` shows that the `accepted` causes leave; their laws may leave λ of `form` on each joint
+/// because they are not exact.
 fn left(
     study: &Study,
     (accepted, rest): (&Span, &Image),
@@ -316,5 +316,5 @@ fn left(
         let is_there = |cause: &Cause| cause.joint.is_none_or(|own| own == j + 1);
         causes.iter().any(|cause| cause.kind.is_a_law() && is_there(cause))
     };
-    misfit::left(study, accepted, rest, lack, &Known { has_law, can_differ, form })
+    misfit::left(study, accepted, rest, lack, &KnownOfJoints { has_law, can_differ, form })
 }

@@ -1,5 +1,5 @@
-//! The entries of a [`Study`]: every family at every site with every starting shape, as whitened columns outside the null
-//! model.
+//! The entries of a [`Study`]: every family at every site with every starting shape, as whitened columns outside the
+//! null model.
 
 use rayon::prelude::*;
 
@@ -20,8 +20,8 @@ struct Bank {
 /// reflects the noise of the null model's accelerations, which the residual contains as well. A spring on a joint
 /// without gravity keeps 2.7 %, and was found in one of 50 logs without a spring.
 pub(super) const ABSORBED: f64 = 0.04;
-/// The same for a law that is not looked for, but compared with what was found. A torque constant of joint 5 that is off
-/// by a fifth keeps 1 to 4 % of its effect outside the null model, which is many times the noise, and was told as a
+/// The same for a law that is not looked for, but compared with what was found. A torque constant of joint 5 that is
+/// off by a fifth keeps 1 to 4 % of its effect outside the null model, which is many times the noise, and was told as a
 /// torque constant and an angle of joint 4.
 pub(super) const FAINT: f64 = 0.01;
 /// How much of these limits is asked of a cause that was found with an earlier estimate of the arm. The shares differ a
@@ -151,7 +151,8 @@ impl Study<'_> {
         richer.filter(|entry| entry.images.len() > plain).chain(finer).collect()
     }
 
-    /// The entries of a family at a site with these shapes, computed together; `None` where the null model absorbs them.
+    /// The entries of a family at a site with these shapes, computed together; `None` where the null model absorbs
+    /// them.
     fn bank(&self, family: usize, site: Option<usize>, shapes: &[Shape]) -> Vec<Option<Entry>> {
         self.outside((family, site), shapes, self.images(family, site, shapes), ABSORBED)
     }
@@ -164,8 +165,8 @@ impl Study<'_> {
         columns.iter().map(of_shape).collect()
     }
 
-    /// The entries whose whitened columns are `images`, for each of `shapes`; `None` if less than the share `absorbed` of
-    /// their length is outside the null model.
+    /// The entries whose whitened columns are `images`, for each of `shapes`; `None` if less than the share `absorbed`
+    /// of their length is outside the null model.
     fn outside(
         &self,
         (family, site): Place,

@@ -36,8 +36,8 @@ pub struct Effect {
 
 /// Standard deviation of the coefficients of [`Candidate::loose`] relative to that of the law, before any log is seen.
 ///
-/// The directions are differences to other drives and flanks that are listed as extremes, so that most arms are within a
-/// part of them.
+/// The directions are differences to other drives and flanks that are listed as extremes, so that most arms are within
+/// a part of them.
 const OFF: f64 = 0.3;
 
 /// Smallest curve that bristles hold, relative to Coulomb friction.
@@ -62,8 +62,8 @@ impl Extension {
     /// Fits the null model and `entries` to `torque` by least squares in the whitened equations. `torque` is the
     /// study's own, or that of other periods of the same motion.
     ///
-    /// What a law takes for granted about the drives may be fitted with it ([`Candidate::carries_loose`]), as far as the
-    /// log insists (ridge regression, Hoerl and Kennard 1970): the drives are the same along another motion.
+    /// What a law takes for granted about the drives may be fitted with it ([`Candidate::carries_loose`]), as far as
+    /// the log insists (ridge regression, Hoerl and Kennard 1970): the drives are the same along another motion.
     pub fn fit(study: &Study, entries: &[&Entry], torque: &Image) -> Self {
         let mut residual = torque.clone();
         study.null.residualise(&mut residual);
@@ -137,7 +137,8 @@ impl Extension {
         self.telling(families, Scene::new(arm, set, &self.theta, prepared))
     }
 
-    /// `scene` told the friction of [`Self::told`] on joints where one law changes that of another, or bristles hold a curve.
+    /// `scene` told the friction of [`Self::told`] on joints where one law changes that of another, or bristles hold a
+    /// curve.
     pub fn telling(&self, families: &[Box<dyn Candidate>], mut scene: Scene) -> Scene {
         for j in 0..scene.joints() {
             let kinds = on_joint(&self.told, j).map(|effect| families[effect.family].kind());

@@ -6,9 +6,9 @@ use super::kind::Kind;
 use super::study::Study;
 use super::verdict::Cause;
 
-/// Laws are exact to this share of what they do, in units of the noise; less of it than that is no other effect. The right
-/// law of a strong effect in the simulated arm left 0.015 Nm of a ripple of 0.8 Nm; of 38 wrong laws of strong effects that
-/// were withheld none left as little as this share.
+/// Laws are exact to this share of what they do, in units of the noise; less of it than that is no other effect. The
+/// right law of a strong effect in the simulated arm left 0.015 Nm of a ripple of 0.8 Nm; of 38 wrong laws of strong
+/// effects that were withheld none left as little as this share.
 pub(super) const EXACT: f64 = 0.03;
 /// A law with less confidence than this has no form that could be wrong.
 const LIKELY: f64 = 0.5;

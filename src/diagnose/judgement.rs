@@ -39,8 +39,8 @@ impl Selected {
 pub struct Form {
     /// The effect in this form, with its coefficients.
     pub effect: Effect,
-    /// Twice the log-likelihood that this form lacks. Prices do not count, so that an interval also holds the values of a form with
-    /// another coefficient that the log neither shows nor excludes.
+    /// Twice the log-likelihood that this form lacks. Prices do not count, so that an interval also holds the values of
+    /// a form with another coefficient that the log neither shows nor excludes.
     pub behind: f64,
 }
 

@@ -52,8 +52,8 @@ impl Lateness {
 mod tests {
     use super::*;
 
-    /// A slow sine behind either lateness, with the response that belongs to it. A low-pass that takes the mean between two
-    /// ticks is late by 1/(12 T) ticks more than T = 7: by 3.7e-4 of the amplitude at ω = 0.0314.
+    /// A slow sine behind either lateness, with the response that belongs to it. A low-pass that takes the mean between
+    /// two ticks is late by 1/(12 T) ticks more than T = 7: by 3.7e-4 of the amplitude at ω = 0.0314.
     #[test]
     fn a_series_is_late_as_its_response_says() {
         let omega = std::f64::consts::TAU / 200.0;

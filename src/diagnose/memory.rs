@@ -11,9 +11,9 @@ use super::candidates::Shape;
 use super::image::Image;
 use super::study::{Entry, Place};
 
-/// Upper limit of the bytes of columns that are kept of a place. What is beyond it is computed anew each time. Places have
-/// limits of their own because several are searched at once: with a common one, which columns are kept would depend on
-/// how the threads run, and the last bit of a column depends on those that are computed with it.
+/// Upper limit of the bytes of columns that are kept of a place. What is beyond it is computed anew each time. Places
+/// have limits of their own because several are searched at once: with a common one, which columns are kept would
+/// depend on how the threads run, and the last bit of a column depends on those that are computed with it.
 const MOST_BYTES: usize = 4 << 20;
 
 /// A place, a variant of the shape, and the bits of the shape's value.
@@ -26,18 +26,19 @@ fn key(place: Place, shape: &Shape) -> Key {
 /// The cache itself.
 #[derive(Default)]
 pub struct Memory {
-    known: Mutex<Known>,
+    contents: Mutex<Contents>,
 }
 
+/// What the cache holds.
 #[derive(Default)]
-struct Known {
+struct Contents {
     /// `None` for shapes whose columns the null model absorbs.
     entries: HashMap<Key, Option<Entry>>,
     loose: HashMap<Key, Arc<[Image]>>,
     bytes: HashMap<Place, usize>,
 }
 
-impl Known {
+impl Contents {
     /// Whether there is room for `images` of `place`, which is then taken.
     fn takes(&mut self, place: Place, images: &[Image]) -> bool {
         let bytes: usize = images.iter().map(Image::bytes).sum();
@@ -50,8 +51,8 @@ impl Known {
 
 impl Memory {
     /// Values are inserted whole or not at all, so a lock poisoned by a panic elsewhere still guards valid ones.
-    fn lock(&self) -> MutexGuard<'_, Known> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Contents> {
+        self.contents.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The entries at `place` with these `shapes`. Those that are not in the cache are computed by `make`, all at once.

@@ -16,8 +16,8 @@
 //!    is added. A law may explain a joint best at an end of its range where it is no longer that law: play without a
 //!    flight, or a Stribeck curve that spans the whole range of speeds or only the speeds at which the sign turns
 //!    round. There it stands in for something unknown and is not named.
-//! 4. The remaining residual is tested against noise, joint by joint and on all joints together. If it is not noise and no
-//!    family fits it, the diagnosis says so; little of what a law does may be left because its form is not exact.
+//! 4. The remaining residual is tested against noise, joint by joint and on all joints together. If it is not noise and
+//!    no family fits it, the diagnosis says so; little of what a law does may be left because its form is not exact.
 
 pub mod candidates;
 

@@ -75,9 +75,9 @@ impl NoiseKnowledge {
     }
 
     /// Twice the gain in log-likelihood when the part of `residual` that `span` explains is removed from it;
-    /// `coordinates` are those of the residual along the span. Rows of the mean period in harmonics whose noise power is
-    /// not well known gain what Student's t gains. What differs between the periods, which only drifts do, gains its full
-    /// square.
+    /// `coordinates` are those of the residual along the span. Rows of the mean period in harmonics whose noise power
+    /// is not well known gain what Student's t gains. What differs between the periods, which only drifts do, gains its
+    /// full square.
     pub fn gain(&self, span: &Span, residual: &Image, coordinates: &[f64]) -> f64 {
         let mut gain: f64 = coordinates.iter().map(|c| c * c).sum();
         let explained = |row: usize| -> f64 {

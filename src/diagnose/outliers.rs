@@ -16,8 +16,8 @@ use crate::median::{median, sigma_of_changes};
 use crate::robot::JointSignals;
 use crate::signal::resolution;
 
-/// Least number of wild readings in one channel of a joint: fewer are an accident, and no fault of the channel. They are
-/// replaced only where they are so many standard deviations off that nothing but an accident can be meant.
+/// Least number of wild readings in one channel of a joint: fewer are an accident, and no fault of the channel. They
+/// are replaced only where they are so many standard deviations off that nothing but an accident can be meant.
 const FEWEST: usize = 3;
 const ACCIDENT: f64 = 50.0;
 /// An angle that is off by less than this share of its usual change between two rows is not wild.

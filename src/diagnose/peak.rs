@@ -121,7 +121,8 @@ mod tests {
         }
     }
 
-    /// With f‴ ≠ 0 the vertex is off by the cubic term over a bracket of a twentieth: f‴/f″ h²/6 with h below 0.06 · 0.62.
+    /// With f‴ ≠ 0 the vertex is off by the cubic term over a bracket of a twentieth: f‴/f″ h²/6 with h below
+    /// 0.06 · 0.62.
     #[test]
     fn the_peak_of_a_lopsided_curve_is_found_to_the_cubic_term() {
         for peak in [0.1, 0.37, 0.61, 0.9] {

@@ -1,18 +1,18 @@
 //! The price of having looked for a law in so many places and shapes.
 //!
-//! All families have equal shares of the chance of a false alarm and of the prior odds. Each divides its shares among its
-//! sites, by the odds that it says it has there ([`prior_odds`](super::candidates::Candidate::prior_odds)); a division of
-//! the chance by odds keeps the chance of all together (Genovese, Roeder and Wasserman 2006). An effect that only the arm
-//! as a whole can have is therefore not made as rare as one on a particular joint of six. A site divides its shares among
-//! the shapes of the law that can be told from each other there.
+//! All families have equal shares of the chance of a false alarm and of the prior odds. Each divides its shares among
+//! its sites, by the odds that it says it has there ([`prior_odds`](super::candidates::Candidate::prior_odds)); a
+//! division of the chance by odds keeps the chance of all together (Genovese, Roeder and Wasserman 2006). An effect
+//! that only the arm as a whole can have is therefore not made as rare as one on a particular joint of six. A site
+//! divides its shares among the shapes of the law that can be told from each other there.
 
 use super::distinct_shapes::DistinctShapes;
 use super::study::{Entry, Study};
 
 impl Study<'_> {
     /// The factor on the probability of `entry` before it is compared with [`LAW`](super::chance::LAW): the number of
-    /// places, as rare as its family is at its site, times the number of shapes of its family there that noise can reach
-    /// and that can be told from each other.
+    /// places, as rare as its family is at its site, times the number of shapes of its family there that noise can
+    /// reach and that can be told from each other.
     pub fn tests(&self, entry: &Entry) -> f64 {
         self.places(entry) / self.odds_over_mean(entry)
             * self.of_shapes(entry, |shapes| shapes.within_reach)

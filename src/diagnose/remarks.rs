@@ -10,8 +10,8 @@ use super::verdict::{Cause, Unexplained};
 use crate::identify::{MOVING_RAD_S, drives_at_limits, resting_joints};
 use crate::robot::{Arm, JointSignals};
 
-/// Time over which a slow error is averaged, in periods of the low-pass: longer than its memory, and with the usual 10 Hz
-/// (0.5 s) shorter than the motion of an arm.
+/// Time over which a slow error is averaged, in periods of the low-pass: longer than its memory, and with the usual
+/// 10 Hz (0.5 s) shorter than the motion of an arm.
 const SLOW_PERIODS: f64 = 5.0;
 /// A residual is slow if these averages hold this many times the share of its square that they hold of white noise.
 const SLOWER_THAN_NOISE: f64 = 3.0;
@@ -98,8 +98,8 @@ pub(super) fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
     })
 }
 
-/// States the joint of a single run of which most is left, if what is left is no white noise: a single run does not tell
-/// whether noise is slow or the model lacks something, but how much is left.
+/// States the joint of a single run of which most is left, if what is left is no white noise: a single run does not
+/// tell whether noise is slow or the model lacks something, but how much is left.
 ///
 /// White noise behind a low-pass of f_c has 1/(2 D f_c) of its square in its means over D.
 pub(super) fn slow_remark(
@@ -192,8 +192,8 @@ mod tests {
         assert_eq!(limited_drives(&arm, &torque(20), &[], Some(&everywhere)).len(), 1);
     }
 
-    /// A constant is all in its means, an alternation not at all, and of ten values that are independent each mean holds a
-    /// tenth.
+    /// A constant is all in its means, an alternation not at all, and of ten values that are independent each mean
+    /// holds a tenth.
     #[test]
     fn means_hold_what_is_slow() {
         let blocks = |y: &dyn Fn(usize) -> f64| {

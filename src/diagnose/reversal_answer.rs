@@ -74,8 +74,8 @@ impl ReversalAnswer {
         late
     }
 
-    /// Σ_i c_i s(t − iΔ − d) with s = `sign` and d = `late_ticks`, Nm, at every `every`-th tick; without `c`, all friction
-    /// of t − d.
+    /// Σ_i c_i s(t − iΔ − d) with s = `sign` and d = `late_ticks`, Nm, at every `every`-th tick; without `c`, all
+    /// friction of t − d.
     fn sum_nm(
         &self,
         c: Option<&[f64]>,

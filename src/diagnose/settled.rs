@@ -22,8 +22,8 @@ const ROUNDS: usize = 4;
 /// A round that gains less than this, in 2 ln of the evidence, changes nothing that counts.
 const SETTLED: f64 = 4.0;
 /// Least number of rounds where one law multiplies the friction of others by 1 + f. Their sizes are those of the round
-/// before, and what is left of an error of sizes falls by less than f in each. Of bristles and a curve that a log hardly
-/// shows, an error of the curve's size fell to 0.56 in each.
+/// before, and what is left of an error of sizes falls by less than f in each. Of bristles and a curve that a log
+/// hardly shows, an error of the curve's size fell to 0.56 in each.
 const ROUNDS_OF_PRODUCTS: usize = 3;
 
 /// Fits what was `found` in `study` and the estimate of the arm in turn, until neither changes the other.
@@ -48,8 +48,8 @@ pub fn settled<'s>(
     Ok((study, found.causes))
 }
 
-/// Whether the scene of `study` was told of laws that are not among the `causes`, and those beside them are computed with
-/// them.
+/// Whether the scene of `study` was told of laws that are not among the `causes`, and those beside them are computed
+/// with them.
 pub fn is_told_of_others(study: &Study, causes: &[Contender]) -> bool {
     let is_cause =
         |effect: &Effect| causes.iter().any(|c| c.entry.place() == (effect.family, effect.site));
@@ -142,8 +142,8 @@ fn margin(kind: Kind) -> f64 {
     if kind.changes_friction() { FAR_AHEAD } else { LEAST_EVIDENCE }
 }
 
-/// What may act on joint `j` beside `causes` and changes their friction, or is held by their bristles, in a scene that was
-/// told of them.
+/// What may act on joint `j` beside `causes` and changes their friction, or is held by their bristles, in a scene that
+/// was told of them.
 ///
 /// A law that explains the joint best but is not its family's own stands in for something unknown there. A curve far
 /// behind it is part of that, as everywhere ([`Kept::grow`]).

@@ -10,8 +10,8 @@ use super::study::{Entry, LEAST_GAIN};
 
 /// A coefficient rules a law out as the family's own only if it still does so this many σ to either side.
 const DOUBT: f64 = 2.0;
-/// A family's law is accurate to this share of its own size: anything smaller on the same joint is no second cause. (What is
-/// left without a name is compared with less, as nothing else explains it: see `form_error`.)
+/// A family's law is accurate to this share of its own size: anything smaller on the same joint is no second cause.
+/// (What is left without a name is compared with less, as nothing else explains it: see `form_error`.)
 const FORM_ERROR: f64 = 0.05;
 /// Least 2 ln of the odds for a cause: e to one.
 pub const LEAST_EVIDENCE: f64 = 2.0;

@@ -2,8 +2,8 @@
 //! one.
 //!
 //! A signal that is quantised in steps Δ and changes by c from reading to reading repeats by chance in about Δ/c of all
-//! readings, and a noisy one as often as it comes back to the reading before the last one. Readings that repeat far more
-//! often while their joint moves are stale, unless they lie at the end of the channel's range.
+//! readings, and a noisy one as often as it comes back to the reading before the last one. Readings that repeat far
+//! more often while their joint moves are stale, unless they lie at the end of the channel's range.
 
 use rayon::prelude::*;
 
@@ -69,13 +69,13 @@ fn in_order(rows: impl Iterator<Item = usize>) -> Vec<usize> {
 }
 
 /// The causes that stale readings make, and the rows in which torques hang.
-pub struct Found {
+pub struct StaleReadings {
     pub causes: Vec<Cause>,
     /// By joint (0-based), the rows of the mended record in which its torque hangs.
     pub hangs: Vec<(usize, Vec<usize>)>,
 }
 
-impl Found {
+impl StaleReadings {
     /// All rows in which a torque hangs, in ascending order.
     pub fn hanging_rows(&self) -> Vec<usize> {
         in_order(self.hangs.iter().flat_map(|(_, rows)| rows.iter().copied()))
@@ -84,7 +84,7 @@ impl Found {
 
 /// Removes the rows with stale readings from `record`. If these are too many, no row is removed and each stale reading
 /// is interpolated instead. A torque that hangs is left as it is.
-pub fn mend(record: &mut Record) -> Found {
+pub fn mend(record: &mut Record) -> StaleReadings {
     let joints = record.torque_nm.joints();
     let samples = record.time_s.len();
     let found: Vec<OfJoint> = (0..joints).into_par_iter().map(|j| of_joint(record, j)).collect();
@@ -109,7 +109,7 @@ pub fn mend(record: &mut Record) -> Found {
     let hangs = hanging.map(|OfJoint { joint, hangs, .. }| {
         (joint, hangs.into_iter().filter(is_left).map(place).collect())
     });
-    Found { causes, hangs: hangs.collect() }
+    StaleReadings { causes, hangs: hangs.collect() }
 }
 
 /// One cause for all joints if they repeat the same rows, else one cause for every joint that repeats any.
@@ -299,9 +299,9 @@ mod tests {
         assert_eq!(mend(&mut half).causes, []);
     }
 
-    /// Slopes, over five rows, of angles in steps of 50 µrad are multiples of a step of 0.5 mrad/s. Times are rounded to
-    /// nanoseconds, so that no smallest difference shows this step. Of the slopes of a slow joint, 1.4 % repeat the one
-    /// before (seven times the least share), and 1.6 % the one before the last.
+    /// Slopes, over five rows, of angles in steps of 50 µrad are multiples of a step of 0.5 mrad/s. Times are rounded
+    /// to nanoseconds, so that no smallest difference shows this step. Of the slopes of a slow joint, 1.4 % repeat the
+    /// one before (seven times the least share), and 1.6 % the one before the last.
     #[test]
     fn slopes_of_rounded_angles_are_not_stale() {
         let mut record = record(4.0, 0.3);
@@ -321,8 +321,8 @@ mod tests {
         assert_eq!(mend(&mut record).causes, []);
     }
 
-    /// Backward differences of angles in steps of 96 µrad, printed in degrees per second with four digits, come in steps of
-    /// 12 mrad/s, about as much as the velocity changes from row to row.
+    /// Backward differences of angles in steps of 96 µrad, printed in degrees per second with four digits, come in
+    /// steps of 12 mrad/s, about as much as the velocity changes from row to row.
     #[test]
     fn printed_differences_of_rounded_angles_are_not_stale() {
         let mut record = record(4.0, 0.3);

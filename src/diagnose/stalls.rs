@@ -34,6 +34,10 @@ const IN_RHYTHM: f64 = 0.8;
 /// Stalls whose median distance is below this, in rows, come in bursts.
 const BURST_ROWS: f64 = 5.0;
 
+/// Square of the speed of all joints together, (rad/s)², up to which only the resolution of the angle is seen: of
+/// 0.1 rad/s.
+const SEEN_SQUARE: f64 = 1e-2;
+
 /// Finds the rows behind which more time passed than the time stamps say, and is not made up for by the steps beside
 /// them. `None` for fewer than three.
 pub fn stalls(m: &Measurement) -> Option<Stalls> {
@@ -67,7 +71,8 @@ pub fn stalls(m: &Measurement) -> Option<Stalls> {
     Some(Stalls { rows, lost_s, reach_s, sigma_s })
 }
 
-/// Time between rows k and k + 1 from the distances that the joints travelled; `None` if they are at rest.
+/// Time between rows k and k + 1 from the distances that the joints travelled; `None` if they are at rest, or too slow
+/// ([`SEEN_SQUARE`]).
 ///
 /// Least squares over the joints of q₁ − q₀ = h (q̇₀ + q̇₁)/2 − h³ q⃛/12 (the trapezoidal rule with its correction),
 /// with q⃛ from the accelerations of the steps on either side, whose middles are h plus one step apart.
@@ -86,8 +91,7 @@ fn passed_s(m: &Measurement, k: usize) -> Option<f64> {
     });
     let joints: Vec<(f64, f64, f64)> = joints.collect();
     let square: f64 = joints.iter().map(|(mean, ..)| mean * mean).sum();
-    // Below this speed, only the resolution of the angle is seen.
-    if square <= 1e-2 {
+    if square <= SEEN_SQUARE {
         return None;
     }
     let mut passed = t[k + 1] - t[k];

@@ -31,8 +31,8 @@ pub enum Statistic {
     },
 }
 
-/// A stretch of time that holds all but this share of the square of a direction gains nothing by it in cross-validation:
-/// what is left of the direction elsewhere is rounding.
+/// A stretch of time that holds all but this share of the square of a direction gains nothing by it in
+/// cross-validation: what is left of the direction elsewhere is rounding.
 const LEAST_SHARE_ELSEWHERE: f64 = 1e-6;
 
 /// What an entry explains.
@@ -126,8 +126,8 @@ impl Statistic {
             .sum()
     }
 
-    /// [`Self::gain`], and λ̂ of what `span` explains: its squared length in units of the noise; for a single run, whose
-    /// noise is not known, the gain.
+    /// [`Self::gain`], and λ̂ of what `span` explains: its squared length in units of the noise; for a single run,
+    /// whose noise is not known, the gain.
     pub fn score(&self, span: &Span, residual: &Image, coordinates: &[f64]) -> Score {
         let gain = self.gain_along(span, residual, coordinates);
         let lambda = match self {
@@ -259,8 +259,8 @@ impl Statistic {
         }
     }
 
-    /// How many blocks make one for the covariance along `directions`. Where they are felt in few long blocks, the short
-    /// ones stay as they are.
+    /// How many blocks make one for the covariance along `directions`. Where they are felt in few long blocks, the
+    /// short ones stay as they are.
     fn joined(&self, directions: &[&[f64]]) -> usize {
         match self {
             Self::Blocks { together, .. }
@@ -390,8 +390,13 @@ mod tests {
     }
 
     /// σ of a constant and of a trend in noise with a memory τ of a second: of blocks of a second, the scatter shows
-    /// about 1 − (1 − e^{−1}) = 37 % of the variance of the slow part, of blocks of five seconds 1 − (1 − e⁻⁵)/5 = 80 %.
-    /// Over 200 runs the mean of the variances has a standard error of a few percent.
+    /// about 1 − (1 − e^{−1}) = 37 % of the variance of the slow part, of blocks of five seconds
+    /// 1 − (1 − e⁻⁵)/5 = 80 %. That is 38 % and 78 % of the whole variance: the white noise, a twenty-first of it,
+    /// shows in all blocks, and the fit of the two parameters takes a little of the slow part.
+    ///
+    /// Over 200 runs, `predicted` is known to 1 % and 2 %, but `found`, a mean of 200 squares, only to √(2/200) = 10 %.
+    /// The ratios have therefore standard errors of 0.04 and 0.08. The bounds are 2.2 and 4.3 of these away from 0.38,
+    /// and 1.7 and 2.7 from 0.78: some four of a hundred seeds would fall outside of them.
     #[test]
     fn slow_noise_needs_longer_blocks() {
         use rand::{SeedableRng, rngs::ChaCha8Rng};

@@ -75,7 +75,8 @@ pub struct Study<'a> {
     pub torque: Image,
     /// Joints (0-based) whose readings are too bad to look for physics in them.
     pub left_out: Vec<usize>,
-    /// Joints (0-based) that do not move: all laws of friction and gears look alike where a joint trembles about a place.
+    /// Joints (0-based) that do not move: all laws of friction and gears look alike where a joint trembles about a
+    /// place.
     pub resting: Vec<usize>,
     /// Effects whose friction the scene was told.
     pub told: Vec<Effect>,

@@ -81,7 +81,8 @@ impl Speed {
     }
 }
 
-/// A motion played more slowly: the same path, with all velocities times `speed` and all accelerations times its square.
+/// A motion played more slowly: the same path, with all velocities times `speed` and all accelerations times its
+/// square.
 #[derive(Debug, Clone, Copy)]
 pub struct Slowed<'a, M: Reference> {
     motion: &'a M,
@@ -220,8 +221,8 @@ mod tests {
 
     /// A motion at the speed s is the designed one at the times s t, and its velocity is the derivative of its angle. A
     /// central difference over ± h is off by at most h²/6 times the largest third derivative, which is s³ Σ_l (l ω)²
-    /// (|a_l| + |b_l|), and by rounding: times of up to 100 s are known to 1.4e-14 s, which at less than 3 rad/s moves the
-    /// two angles by less than 1e-13 rad together.
+    /// (|a_l| + |b_l|), and by rounding: times of up to 100 s are known to 1.4e-14 s, which at less than 3 rad/s moves
+    /// the two angles by less than 1e-13 rad together.
     #[test]
     fn a_slowed_motion_takes_the_same_path() {
         let motion = motion();

@@ -39,8 +39,8 @@ impl Doubt {
     }
 
     /// Whether no arm, or no arm mounted as described, has such parameters: drives that push, gravity that pulls the
-    /// other way, or torque that has little to do with the motion. Otherwise the log may be of another arm, or of another
-    /// load.
+    /// other way, or torque that has little to do with the motion. Otherwise the log may be of another arm, or of
+    /// another load.
     pub fn is_contradiction(&self) -> bool {
         self.contradiction.is_some()
     }

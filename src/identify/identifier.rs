@@ -49,8 +49,8 @@ pub(super) const SAME_RATE: f64 = 0.02;
 /// more informative.
 pub const MANY_PERIODS: usize = 4;
 
-/// Samples at `rate_hz` of which one is kept behind a low-pass of `cutoff_hz`. Rates just below a whole multiple count as
-/// that multiple, so that logs of nearly the same rate keep the same rows.
+/// Samples at `rate_hz` of which one is kept behind a low-pass of `cutoff_hz`. Rates just below a whole multiple count
+/// as that multiple, so that logs of nearly the same rate keep the same rows.
 pub fn kept_every(rate_hz: f64, cutoff_hz: f64) -> usize {
     ((1.0 + SAME_RATE) * rate_hz / (KEPT_RATE * cutoff_hz)).floor().max(1.0) as usize
 }

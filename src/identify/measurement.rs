@@ -37,8 +37,8 @@ impl Measurement<'_> {
         Ok(())
     }
 
-    /// Whether joint `j` ever moves faster than [`MOVING_RAD_S`] beyond its noise: σ √(2 ln N) is hardly exceeded by the
-    /// largest of N noise values.
+    /// Whether joint `j` ever moves faster than [`MOVING_RAD_S`] beyond its noise: σ √(2 ln N) is hardly exceeded by
+    /// the largest of N noise values.
     pub(super) fn moves(&self, j: usize) -> bool {
         let qd_rad_s = self.qd_rad_s.joint(j);
         let peak = (2.0 * (qd_rad_s.len() as f64).ln()).sqrt();

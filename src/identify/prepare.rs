@@ -35,8 +35,8 @@ pub struct Preparer {
 }
 
 impl Preparer {
-    /// As [`Self::prepare`], with what only a diagnosis reads: the motion of every single period, and the resolution and
-    /// limits of the readings, for which whole columns of the log are sorted.
+    /// As [`Self::prepare`], with what only a diagnosis reads: the motion of every single period, and the resolution
+    /// and limits of the readings, for which whole columns of the log are sorted.
     pub fn prepare_for_diagnosis(
         &mut self,
         m: &Measurement,

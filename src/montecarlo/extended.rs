@@ -171,8 +171,8 @@ fn scatter(finding: &Finding, log: &Measurement, signals: &JointSignals) -> Vec<
 mod tests {
     use super::*;
 
-    /// Joint 1 is fastest where the period begins, and moves by all but 5 % of its range: a run-in of T starts v T/2 away,
-    /// beyond the range, and the shortest of 0.5 s least. At 125 Hz, 63 rows hold it.
+    /// Joint 1 is fastest where the period begins, and moves by all but 5 % of its range: a run-in of T starts v T/2
+    /// away, beyond the range, and the shortest of 0.5 s least. At 125 Hz, 63 rows hold it.
     #[test]
     fn the_run_in_of_a_motion_without_any_is_the_one_that_passes_the_limits_least() {
         let mut arm = Arm::built_in("ur5").unwrap();

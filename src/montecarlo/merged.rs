@@ -120,7 +120,8 @@ mod tests {
         (PathBuf::from(format!("{}.json", range[0])), shard)
     }
 
-    /// The first half of a run was stopped after three of its five trials. The trials of the second half are not its own.
+    /// The first half of a run was stopped after three of its five trials. The trials of the second half are not its
+    /// own.
     #[test]
     fn a_shard_that_was_stopped_misses_its_own_trials() {
         let (file, mut half) = shard([0, 5], 1, "a");

@@ -126,12 +126,12 @@ impl Drivetrain for RigidDrivetrain {
     }
 }
 
-/// Rates, in periods of the controller, at which friction may stop a joint: with 10 a torque 0.1 ms early was named in a
-/// fifth of logs, with 2.6 in none.
+/// Rates, in periods of the controller, at which friction may stop a joint: with 10 a torque 0.1 ms early was named in
+/// a fifth of logs, with 2.6 in none.
 const TIED: f64 = 3.0;
 
-/// Joints (0-based) of `arm` that friction stops at the pose `q_rad` within a third of a period of the controller, and the
-/// rate of the controller, Hz, that would be enough for all of them.
+/// Joints (0-based) of `arm` that friction stops at the pose `q_rad` within a third of a period of the controller, and
+/// the rate of the controller, Hz, that would be enough for all of them.
 ///
 /// Such a joint follows the torque that is held. The logged torque, the mean of what is held before and after a sample,
 /// then belongs to a later velocity than the one of the sample, by up to half a period. Joints with a rotor are slower.

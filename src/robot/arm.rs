@@ -93,8 +93,8 @@ impl Placement {
 
     /// Roll, pitch and yaw of [`Self::from_xyz_rpy`], rad, from which the rotation is recovered to the last digits.
     ///
-    /// At a pitch of ±π/2 only the sum or the difference of roll and yaw is determined: roll is computed from what remains
-    /// of the rotation after yaw, whatever its value, is removed.
+    /// At a pitch of ±π/2 only the sum or the difference of roll and yaw is determined: roll is computed from what
+    /// remains of the rotation after yaw, whatever its value, is removed.
     pub fn rpy_rad(&self) -> [f64; 3] {
         let r = &self.rotation;
         let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));

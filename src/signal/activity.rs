@@ -142,8 +142,8 @@ mod tests {
         }
     }
 
-    /// A standing encoder that flickers by one step, for as many rows as make a motion, and by two steps in single rows.
-    /// Six decimals make steps of 0.958 and 0.959 mrad/s of a step of 0.95874 mrad/s.
+    /// A standing encoder that flickers by one step, for as many rows as make a motion, and by two steps in single
+    /// rows. Six decimals make steps of 0.958 and 0.959 mrad/s of a step of 0.95874 mrad/s.
     #[test]
     fn a_printed_step_is_no_motion_and_two_are() {
         const STEP_RAD_S: f64 = 0.00095874;

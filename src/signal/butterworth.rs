@@ -115,7 +115,8 @@ impl ZeroPhase {
         Ok(pad..pad + n)
     }
 
-    /// Filters `series` into `longer`, by [`Self::filter_periodic`] if it `repeats`; returned is where in it the series lies.
+    /// Filters `series` into `longer`, by [`Self::filter_periodic`] if it `repeats`; returned is where in it the series
+    /// lies.
     pub fn filter_into(
         &self,
         series: &[f64],
@@ -209,8 +210,9 @@ mod tests {
         }
     }
 
-    /// The middle of ten edges of repetitions on either side is free of any end. Values within ±1 are continued by at most
-    /// ±3 (2x₀ − x), so that what is assumed beyond either end is off by at most 4, of which three edges leave 1e-6.
+    /// The middle of ten edges of repetitions on either side is free of any end. Values within ±1 are continued by at
+    /// most ±3 (2x₀ − x), so that what is assumed beyond either end is off by at most 4, of which three edges leave
+    /// 1e-6.
     #[test]
     fn a_periodic_series_is_filtered_like_a_long_repetition_of_it() {
         let filter = ZeroPhase::new(5.0, 4, 125.0).unwrap();

@@ -372,8 +372,8 @@ mod tests {
         assert!(largest_difference(&clock.as_logged(&fine, 20, 0.0), &shown) > 10.0 * lost);
     }
 
-    /// A drive damps a swing faster than half the rate by its speed. Of this torque the log shows what the samples of the
-    /// speed have beyond the derivative of the samples of the angle.
+    /// A drive damps a swing faster than half the rate by its speed. Of this torque the log shows what the samples of
+    /// the speed have beyond the derivative of the samples of the angle.
     #[test]
     fn a_damped_swing_is_logged_by_its_samples() {
         let clock = FineClock::new(N, TICKS);

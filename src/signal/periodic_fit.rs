@@ -7,7 +7,8 @@
 //! 1. The means Q̄_h, V̄_h and the scatter S_h = Σ_p |Y_ph − Ȳ_h|² / (P − 1) are computed; the scatter is pooled over
 //!    bands of neighbouring harmonics. S/P is the noise power of a mean coefficient. Rounding that is the same in every
 //!    period does not scatter: its power is known ([`PeriodicRecord`]), and P times as much is added to the periods as
-//!    noise, with a mean of zero. The means stay as they are, and all that follows from the scatter counts the rounding.
+//!    noise, with a mean of zero. The means stay as they are, and all that follows from the scatter counts the
+//!    rounding.
 //! 2. Both channels measure the same series, V_h = ihω Q_h. Weighted by their noise, Q̂_h = Q̄_h + w (V̄_h/ihω − Q̄_h)
 //!    with w = S_q / (S_q + S_v/(hω)²) has the variance v_h = w S_v / (P (hω)²). Slow harmonics come from the angle,
 //!    fast ones from the velocity. A velocity whose scatter follows that of the angle was computed from it and is no

@@ -9,8 +9,8 @@ use crate::robot::JointSignals;
 /// fraction is 0.49 for noise of half a step; it is 0.09 for noise of three steps, whose rounding does not repeat.
 const READ_AGAIN: f64 = 0.05;
 
-/// Of values that are at most ten steps apart there must be so many, and this share of them must be a whole number of steps
-/// apart, to within this fraction of a step. (Decimals of a file may round each step once more.)
+/// Of values that are at most ten steps apart there must be so many, and this share of them must be a whole number of
+/// steps apart, to within this fraction of a step. (Decimals of a file may round each step once more.)
 const NEAR_STEPS: f64 = 10.0;
 const FEWEST_NEAR: f64 = 10.0;
 const MOST_WHOLE: f64 = 0.9;
@@ -159,8 +159,8 @@ mod tests {
         assert_eq!(of_readings(&[2.0; 50], 100), 0.0);
     }
 
-    /// A motion without noise recurs to the last digit, as coarse readings do, but has no steps; steps of 96 µrad that a
-    /// file rounds to 1 µrad are steps.
+    /// A motion without noise recurs to the last digit, as coarse readings do, but has no steps; steps of 96 µrad that
+    /// a file rounds to 1 µrad are steps.
     #[test]
     fn what_recurs_need_not_be_coarse() {
         let w = TAU / 1250.0;

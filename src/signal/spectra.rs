@@ -60,8 +60,8 @@ pub(super) struct Spectra {
 }
 
 impl Spectra {
-    /// Computes mean and scatter of the coefficients in `periods`, of periods of `n` samples, whose `rounding` is the same
-    /// in every period and has this variance.
+    /// Computes mean and scatter of the coefficients in `periods`, of periods of `n` samples, whose `rounding` is the
+    /// same in every period and has this variance.
     pub(super) fn average(&mut self, n: usize, rounding: f64) {
         let bins = n / 2 + 1;
         let count = self.periods.len() / bins;
@@ -128,12 +128,13 @@ impl Spectra {
         (scatter.iter().sum::<f64>() / scatter.len() as f64).max(self.floor)
     }
 
-    /// How much of the scatter of `other` follows this one's through some filter: |Σ D*E|² over Σ|D|² Σ|E|², D and E being
-    /// the deviations of both from their means, summed over all periods and the harmonics of a band, and pooled over the
-    /// fastest third of the `bands`, where no arm moves. 1 for a signal that was computed from the other, about
-    /// 1/(8 (P − 1)) for two sensors. 0 where the signal has more than noise and rounding there: both then show the same
-    /// motion. Where most of the noise is rounding that repeats, the coefficients themselves are compared, and the result is
-    /// how much of the noise of this signal follows the other: of two sensors nothing, whatever motion both show.
+    /// How much of the scatter of `other` follows this one's through some filter: |Σ D*E|² over Σ|D|² Σ|E|², D and E
+    /// being the deviations of both from their means, summed over all periods and the harmonics of a band, and pooled
+    /// over the fastest third of the `bands`, where no arm moves. 1 for a signal that was computed from the other,
+    /// about 1/(8 (P − 1)) for two sensors. 0 where the signal has more than noise and rounding there: both then show
+    /// the same motion. Where most of the noise is rounding that repeats, the coefficients themselves are compared, and
+    /// the result is how much of the noise of this signal follows the other: of two sensors nothing, whatever motion
+    /// both show.
     pub(super) fn coherence(&self, other: &Self, bands: &[Band]) -> f64 {
         let bins = self.mean.len();
         let count = self.periods.len() as f64 / bins as f64;

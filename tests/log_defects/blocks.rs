@@ -156,7 +156,8 @@ fn guessed_gains_are_told() {
     assert!(remarks("ur10e", &currents, &Layout::default()).is_empty());
 }
 
-/// The log that a layout like armid's, with `lines` of its own, reads in the valid file with torques behind its currents.
+/// The log that a layout like armid's, with `lines` of its own, reads in the valid file with torques behind its
+/// currents.
 fn read_with_torques(lines: &str) -> Result<Log, LogError> {
     let mut rows = valid();
     rows[0].extend((0..JOINTS).map(|j| format!("actual_torque_{j}")));

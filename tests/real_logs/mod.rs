@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-/// The folder named by `ARMID_DATA`, which has the logs of a UR10e in `ur10e/`. If there is none, the reason is printed and
-/// the tests pass.
+/// The folder named by `ARMID_DATA`, which has the logs of a UR10e in `ur10e/`. If there is none, the reason is printed
+/// and the tests pass.
 pub fn folder() -> Option<PathBuf> {
     let Some(folder) = std::env::var_os("ARMID_DATA").map(PathBuf::from) else {
         println!("skipped: ARMID_DATA is not set (the folder with the real logs)");

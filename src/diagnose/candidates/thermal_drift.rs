@@ -1,6 +1,7 @@
-//! Friction that changes while the arm warms up: τ = f F (1 − e^{−t/T}), with F = F_c sign q̇ + F_v q̇ and what other laws
-//! add to the friction of the joint. t counts from the start of the record, not of the part that is used: a motion that changes with its friction becomes periodic only later. The
-//! effect itself does not repeat, so that the differences between periods show it.
+//! Friction that changes while the arm warms up: τ = f F (1 − e^{−t/T}), with F = F_c sign q̇ + F_v q̇ and what other
+//! laws add to the friction of the joint. t counts from the start of the record, not of the part that is used: a motion
+//! that changes with its friction becomes periodic only later. The effect itself does not repeat, so that the
+//! differences between periods show it.
 
 use super::*;
 

@@ -100,7 +100,7 @@ fn band_edges(first: [usize; BANDS_HZ.len()], end: usize) -> Vec<usize> {
 }
 
 /// What is known of the joints when their residuals are looked at.
-pub struct Known<'k, L, D> {
+pub struct KnownOfJoints<'k, L, D> {
     /// Whether a law is named on a joint (0-based).
     pub has_law: L,
     /// Whether the periods of a joint (0-based) may differ for no reason that is known already.
@@ -148,7 +148,7 @@ pub fn left(
     accepted: &Span,
     residual: &Image,
     lack_of_fit: Option<&LackOfFit>,
-    known: &Known<impl Fn(usize) -> bool, impl Fn(usize) -> bool>,
+    known: &KnownOfJoints<impl Fn(usize) -> bool, impl Fn(usize) -> bool>,
 ) -> Left {
     let around = |joint: usize| {
         let (has_law, can_differ) = ((known.has_law)(joint), (known.can_differ)(joint));

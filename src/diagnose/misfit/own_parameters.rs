@@ -8,9 +8,9 @@ use crate::diagnose::study::Study;
 /// The one of `joints` (0-based) whose `residual` noise explains least if each of them may have base parameters of its
 /// own, where noise explains what these parameters remove on all of them in less than the share `level` of logs.
 ///
-/// Newton's third law makes the torques of all joints depend on the same parameters. An arm whose lengths, axes or gains
-/// are not those of the model breaks that: what the load does to one joint is then not what it does to the others.
-/// Which error it is remains open, but the columns of the regressor, joint by joint, follow all of them.
+/// Newton's third law makes the torques of all joints depend on the same parameters. An arm whose lengths, axes or
+/// gains are not those of the model breaks that: what the load does to one joint is then not what it does to the
+/// others. Which error it is remains open, but the columns of the regressor, joint by joint, follow all of them.
 pub(super) fn with_own_parameters(
     study: &Study,
     accepted: &Span,

@@ -5,17 +5,17 @@ use crate::diagnose::image::{Image, Span};
 use crate::diagnose::statistic::{Statistic, upper_chi_squared};
 use crate::diagnose::study::Study;
 
-/// An axis is looked at if noise explains the curves of its joints in less than this share of logs, were they independent.
-/// How their torques go together moves that probability by a factor, and what is looked for lies orders of magnitude
-/// lower.
+/// An axis is looked at if noise explains the curves of its joints in less than this share of logs, were they
+/// independent. How their torques go together moves that probability by a factor, and what is looked for lies orders of
+/// magnitude lower.
 const SCREEN: f64 = 0.05;
 
-/// The curves of the joints that are asked (`is_asked`), all along one axis, if noise explains what they remove together
-/// in less than the share `level` of logs: of the axis that noise explains least, the index in `found` of the curve with
-/// the most evidence. `None` for a single run, whose noise is not known.
+/// The curves of the joints that are asked (`is_asked`), all along one axis, if noise explains what they remove
+/// together in less than the share `level` of logs: of the axis that noise explains least, the index in `found` of the
+/// curve with the most evidence. `None` for a single run, whose noise is not known.
 ///
-/// What acts on the arm as a whole, like an error of its geometry, may leave less on each joint than a curve needs to be
-/// clear. With the curves of all joints in one span, the residual's part in it is tested like that of a curve alone.
+/// What acts on the arm as a whole, like an error of its geometry, may leave less on each joint than a curve needs to
+/// be clear. With the curves of all joints in one span, the residual's part in it is tested like that of a curve alone.
 pub(super) fn together(
     study: &Study,
     residual: &Image,
@@ -65,8 +65,8 @@ pub(super) fn joined<'s>(spans: impl Iterator<Item = &'s Span>) -> Span {
 mod tests {
     use super::*;
 
-    /// Two joints whose torques go together: their second directions are the same but for a twentieth, and the second of
-    /// the two counts no more.
+    /// Two joints whose torques go together: their second directions are the same but for a twentieth, and the second
+    /// of the two counts no more.
     #[test]
     fn directions_that_joints_share_count_once() {
         let span = |columns: [[f64; 4]; 2]| {

@@ -31,8 +31,8 @@ pub enum Whitening {
 }
 
 impl Whitening {
-    /// For a log whose noise is not asked for: the filter that the columns of a single run go through ([`Self::as_regressed`]),
-    /// with weights of 1; `None` where the motion repeats, which needs none.
+    /// For a log whose noise is not asked for: the filter that the columns of a single run go through
+    /// ([`Self::as_regressed`]), with weights of 1; `None` where the motion repeats, which needs none.
     pub fn filter_of(
         regression: &Regression,
         options: &Options,

@@ -18,8 +18,9 @@ use crate::signal::pooled_level;
 
 /// Whitened rows per harmonic: √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, where S = L Lᴴ
 /// is the N × N noise covariance of one period's Fourier coefficients. Where samples of some periods are missing and
-/// filled in from the others, which takes from the scatter and from what the mean gains by P periods, both are corrected
-/// for it ([`Prepared::kept`](crate::identify::Prepared::kept)). The degrees of freedom of S stay those of P periods.
+/// filled in from the others, which takes from the scatter and from what the mean gains by P periods, both are
+/// corrected for it ([`Prepared::kept`](crate::identify::Prepared::kept)). The degrees of freedom of S stay those of P
+/// periods.
 ///
 /// S is estimated from the scatter between periods. The scatter is divided by the trend of every joint's power over
 /// frequency ([`noise_trends`]), so that steep noise does not bias it, averaged over neighbouring harmonics, and scaled

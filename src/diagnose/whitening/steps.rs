@@ -82,8 +82,8 @@ mod tests {
         steps.iter().enumerate().filter_map(is_high).collect()
     }
 
-    /// White noise ends a period where it began. Two of ten records show a step by chance once in 200 times (2 % each:
-    /// all joints, or one of them).
+    /// White noise ends a period where it began. By chance, 2 % of records show a step (1 % that of all joints, 1 %
+    /// that of one of them), and two or more of ten records once in 62 times: 1 − 0.98¹⁰ − 10 · 0.02 · 0.98⁹ = 1.6 %.
     #[test]
     fn white_noise_does_not_step() {
         let records = (0..10).filter(|seed| !stepping(*seed, |_| 0.0).is_empty()).count();

@@ -173,8 +173,8 @@ pub fn search(
     Found { candidates, tried_starts, feasible_starts, evaluations, cut_short }
 }
 
-/// Takes the entrant that came from `start` and is at `from` now through `stages`; `None` if no motion about its offsets
-/// is feasible.
+/// Takes the entrant that came from `start` and is at `from` now through `stages`; `None` if no motion about its
+/// offsets is feasible.
 fn refined(
     problem: &Problem,
     ws: &mut ProblemWorkspace,

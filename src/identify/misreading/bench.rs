@@ -88,8 +88,8 @@ impl Match {
         self.beyond_noise.iter().any(|left| *left > share) || self.friction_pushes.contains(&true)
     }
 
-    /// Whether the log may have to be read differently: the model leaves part of it, or something pushes. Where the model
-    /// leaves nothing but rounding, only the sign of all torques can be wrong.
+    /// Whether the log may have to be read differently: the model leaves part of it, or something pushes. Where the
+    /// model leaves nothing but rounding, only the sign of all torques can be wrong.
     pub(super) fn calls_for_another(&self) -> bool {
         let is_recorded = self.left.iter().any(|left| *left > ROUNDING);
         self.is_clearly_turned() || (is_recorded && self.leaves_more_than(EXPLAINED))

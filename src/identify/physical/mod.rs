@@ -10,9 +10,9 @@
 //! (P. M. Wensing, S. Kim, J.-J. Slotine, "Linear matrix inequalities for physically consistent inertial parameter
 //! identification", 2018). D pulls x to the robot file. It is the constant pull-back metric ½ Σ tr(P₀⁻¹ΔP P₀⁻¹ΔP), or
 //! the entropic divergence Σ tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4 (T. Lee, P. M. Wensing, F. C. Park, "Geometric robot
-//! dynamic identification", 2020); drive parameters are pulled likewise through x/x₀. Of a UR5, x has 78 or 84 entries, and
-//! the data determine 52 or 58 combinations of them. The prior determines the others; of the combinations in the data,
-//! with the default γ = 1, it determines only those known to less than 100 % of the robot file's values.
+//! dynamic identification", 2020); drive parameters are pulled likewise through x/x₀. Of a UR5, x has 78 or 84 entries,
+//! and the data determine 52 or 58 combinations of them. The prior determines the others; of the combinations in the
+//! data, with the default γ = 1, it determines only those known to less than 100 % of the robot file's values.
 //!
 //! Enters: a [`Fit`](super::Fit) with its covariance. Leaves: a [`PhysicalEstimate`]: standard parameters, how far
 //! they are from optimal, whether the unconstrained estimate was realisable, and whether the repair cost more fit

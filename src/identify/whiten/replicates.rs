@@ -11,8 +11,8 @@ use crate::signal::{HarmonicPower, pooled, subtract_mean_period};
 ///
 /// With the Fourier coefficients Y_pk of period p and their mean Ȳ_k, the noise of joint j at harmonic k has the
 /// variance s²_jk = Σ_p |Y_jpk − Ȳ_jk|²/(P − 1), averaged over the neighbouring harmonics ([`pooled`]: k ± max(3, k/4),
-/// without k itself). The joints have the correlation C of the deviations over s, pooled over all harmonics. Rows become U
-/// diag(1/s_k) · row with U C Uᵀ = 1.
+/// without k itself). The joints have the correlation C of the deviations over s, pooled over all harmonics. Rows
+/// become U diag(1/s_k) · row with U C Uᵀ = 1.
 ///
 /// Rows end at 0.08 of the sampling rate. Near a reversal of friction the acceleration is a pulse shorter than a
 /// sample, and the derivative of the sampled velocity contains a share of it that falls with frequency. The missing

@@ -104,7 +104,8 @@ impl Layout {
         own.into_iter().chain(below).collect()
     }
 
-    /// Whether `key` is stated in a layout that inherits `other`. A key within a table is written behind that of the table.
+    /// Whether `key` is stated in a layout that inherits `other`. A key within a table is written behind that of the
+    /// table.
     pub(super) fn overrides(&self, key: &[&str], other: &[&str]) -> bool {
         self.depth_of(key).zip(self.depth_of(other)).is_some_and(|(key, other)| key < other)
     }

@@ -80,16 +80,16 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 /// current = { first = 14, last = 19 }   # column numbers count from 1
 ///
 /// [joints]                     # where the robot's description counts otherwise; joints from 1
-/// order = [3, 2, 1, 4, 5, 6]   # each joint of the arm by the recorder's count; torque_order, where torques have their own
+/// order = [3, 2, 1, 4, 5, 6]   # each joint of the arm by the recorder's count; torque_order, where torques differ
 /// motion_reversed = [3]        # angle and velocity, by the arm's count
 /// torque_reversed = [3]
 /// zero = [0, -90, 0, 0, 0, 0]  # added to the angles, in the unit of q
 /// ```
 ///
-/// Blocks: `time q qd`, `current` or `torque` (Nm; it takes precedence where both are present, see below), and optionally
-/// `time_nanoseconds` (added to the time: ROS stamps), `target_q target_qd target_qdd target_current target_moment
-/// temperature`. The unit of `q` also applies to `target_q`, and likewise for the other targets. Layouts for files
-/// without a header must list their possible widths:
+/// Blocks: `time q qd`, `current` or `torque` (Nm; it takes precedence where both are present, see below), and
+/// optionally `time_nanoseconds` (added to the time: ROS stamps), `target_q target_qd target_qdd target_current
+/// target_moment temperature`. The unit of `q` also applies to `target_q`, and likewise for the other targets. Layouts
+/// for files without a header must list their possible widths:
 ///
 /// ```toml
 /// [[width]]
@@ -99,9 +99,9 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 ///
 /// With `like = "armid"` (a built-in name, or a file beside this one) everything that this layout does not state is
 /// taken from the other layout: `[units]` and `[columns]` key by key, any other entry as a whole. What a layout states
-/// itself beats what it inherits, so one that states `current` and inherits `torque` reads the currents of a log that has
-/// both. If torques are read with a layout that inherits `torque` and states `drive_gain_nm_a` or `current`, a warning
-/// says so.
+/// itself beats what it inherits, so one that states `current` and inherits `torque` reads the currents of a log that
+/// has both. If torques are read with a layout that inherits `torque` and states `drive_gain_nm_a` or `current`, a
+/// warning says so.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layout {
@@ -196,7 +196,8 @@ impl Layout {
         self.checked_by(&|layout: &Self| layout.joints.check_for(joints))
     }
 
-    /// Checks that the layout has a drive gain for each joint of an arm with this many joints, even if no current is read.
+    /// Checks that the layout has a drive gain for each joint of an arm with this many joints, even if no current is
+    /// read.
     pub(super) fn check_gains_for(&self, joints: usize) -> Result<(), LogError> {
         self.checked_by(&|layout: &Self| match layout.drive_gain_nm_a.as_ref().map(Vec::len) {
             Some(found) if found != joints => Err(LayoutFault::GainCount { found, joints }),

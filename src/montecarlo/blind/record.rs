@@ -129,7 +129,7 @@ impl HeldOutGain {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Answer {
-    /// Causes in the order of the diagnosis: faults of the record first, then the others, the strongest first.
+    /// Causes in the order of the diagnosis.
     pub named: Vec<Named>,
     /// The unexplained residual, if any.
     pub left: Option<Left>,

@@ -196,8 +196,8 @@ pub(super) fn central_difference(frequency_hz: f64, rate_hz: f64) -> f64 {
 }
 
 /// Number of ends of the low-pass that a period must be long. Identification cuts off an end at either side of a single
-/// run, but no more than an eighth of its samples: the record with both ends must be eight of them long, and its periods
-/// six.
+/// run, but no more than an eighth of its samples: the record with both ends must be eight of them long, and its
+/// periods six.
 const ENDS_PER_PERIOD: f64 = 6.0 / RECORD_PERIODS as f64;
 
 /// Refuses a scenario whose period is too short for [`around`] at the lowest cut-off.

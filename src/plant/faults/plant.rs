@@ -101,8 +101,8 @@ impl FaultyPlant {
         Ok(recording)
     }
 
-    /// As [`Self::run`], but no reading of the torque ends at a limit: that is what noise is added to. The limits then cut
-    /// the noise off as well ([`Self::spoil`]).
+    /// As [`Self::run`], but no reading of the torque ends at a limit: that is what noise is added to. The limits then
+    /// cut the noise off as well ([`Self::spoil`]).
     pub fn run_before_limits(
         &self,
         reference: &dyn Reference,

@@ -2,8 +2,8 @@
 
 use std::path::{Component, Path, PathBuf};
 
-/// Names of the `files` that differ: each is that of the file without its extension, behind as many of its folders as it
-/// takes to tell it from the others. A file that no folder tells from another keeps its whole path.
+/// Names of the `files` that differ: each is that of the file without its extension, behind as many of its folders as
+/// it takes to tell it from the others. A file that no folder tells from another keeps its whole path.
 pub(super) fn short_names(files: &[&Path]) -> Vec<String> {
     let deepest = files.iter().map(|file| file.components().count()).max().unwrap_or(0);
     let short = |(k, file): (usize, &&Path)| {

@@ -366,8 +366,8 @@ mod tests {
         }
     }
 
-    /// The robot's own drive file replaces a capsule, takes a pair out and limits a torque. One new file beside its URDF
-    /// and an MJCF says the same to both.
+    /// The robot's own drive file replaces a capsule, takes a pair out and limits a torque. One new file beside its
+    /// URDF and an MJCF says the same to both.
     #[test]
     fn one_drive_file_fits_a_urdf_and_an_mjcf() {
         let shapes = |text: String| {

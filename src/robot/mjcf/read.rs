@@ -53,8 +53,8 @@ pub struct MjcfArm {
 ///   says. Named sites become frames, as bodies without mass do.
 /// - **Drives**: `armature` is the rotor inertia, `damping` is rv, `frictionloss` is rc. The torque limit is the
 ///   smaller of the joint's `actuatorfrcrange` and the limit of its actuators: `gear` times the `forcerange`, or for a
-///   motor times the `ctrlrange` if that is smaller; from 1e9 Nm on it is unknown. `armature` and `damping` of actuators
-///   are added, times `gear`².
+///   motor times the `ctrlrange` if that is smaller; from 1e9 Nm on it is unknown. `armature` and `damping` of
+///   actuators are added, times `gear`².
 /// - **Default classes**, `childclass`, `<include>`, `<frame>` and the ways to give orientations are as in MuJoCo.
 ///   Copies (`<replicate>`), attached models, deformable bodies and the mass of meshes on moving bodies are refused.
 /// - **Collision shapes** are the geoms with a `contype` or `conaffinity`, including those of the world, except planes

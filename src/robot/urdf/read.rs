@@ -32,8 +32,8 @@ use crate::robot::inertia::LinkInertia;
 /// - **Joint frames**: the origin is that of the URDF joint, z lies along the joint axis a. With a given in the link
 ///   frame, the joint frame is the link frame turned by S with S ẑ = a: the smallest rotation from ẑ to a if a_z ≥ 0,
 ///   otherwise π about x followed by the smallest rotation from −ẑ to a. For the axis z, S = 1.
-/// - **Friction**: `damping` is rv, `friction` is rc. **Limits**: `effort` is the torque limit (unknown from 1e9 Nm on),
-///   `velocity` the speed limit. The soft limits of a `<safety_controller>` narrow the range.
+/// - **Friction**: `damping` is rv, `friction` is rc. **Limits**: `effort` is the torque limit (unknown from 1e9 Nm
+///   on), `velocity` the speed limit. The soft limits of a `<safety_controller>` narrow the range.
 /// - **Collision shapes** become capsules on the bodies, and pairs of capsules to keep apart; meshes (STL, OBJ) are
 ///   searched for from the folder of `source`. The notices name everything that is not watched. Visual geometry is not
 ///   read.

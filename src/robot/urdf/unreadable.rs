@@ -1,5 +1,5 @@
-//! Texts that the parser rejects: what it asks for too much is supplied, and what is wrong is put into words that lead to
-//! the place.
+//! Texts that the parser rejects: what it asks for too much is supplied, and what is wrong is put into words that lead
+//! to the place.
 
 use roxmltree::{Document, Node, ParsingOptions};
 

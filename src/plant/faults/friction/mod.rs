@@ -149,8 +149,8 @@ impl Friction {
         [bound(f64::min), bound(f64::max)]
     }
 
-    /// Where bristles have to hold a curve without Coulomb friction, or one that takes all of it away: the least friction,
-    /// Nm, that would be left.
+    /// Where bristles have to hold a curve without Coulomb friction, or one that takes all of it away: the least
+    /// friction, Nm, that would be left.
     pub(super) fn not_held_nm(&self) -> Option<f64> {
         let falls = self.stribeck.iter().map(|part| part.extra_nm.min(0.0));
         let least_nm = self.coulomb_nm + falls.sum::<f64>();
@@ -227,11 +227,11 @@ impl Friction {
             + self.powers.iter().map(power).sum::<f64>();
         let mut bristles = 0.0;
         match &self.presliding {
-            // With γ between g and G, |z| ≤ G and R = G/g, the law is rc (z + T ż) + p (z + T ż)/γ + a (z/γ)², where p are
-            // the parts of c beside rc and d. At constant z, |d(z/γ)/dq̇| ≤ R γ'/g, with γ' ≤ steepest d/rc; and, as
-            // |q̇ γ'| ≤ d/rc, |dż/dq̇| ≤ k (1 + R) (1 + d/(rc g)), to which 1/γ adds as much again for p. `bristles` is the
-            // stiffness of the oscillator of joint and bristle, from which the terms in T cancel: dτ/dz times dż/dq̇ of a
-            // bristle at rest, k, and more by as much as the curve can make of it.
+            // With γ between g and G, |z| ≤ G and R = G/g, the law is rc (z + T ż) + p (z + T ż)/γ + a (z/γ)², where p
+            // are the parts of c beside rc and d. At constant z, |d(z/γ)/dq̇| ≤ R γ'/g, with γ' ≤ steepest d/rc; and,
+            // as |q̇ γ'| ≤ d/rc, |dż/dq̇| ≤ k (1 + R) (1 + d/(rc g)), to which 1/γ adds as much again for p. `bristles`
+            // is the stiffness of the oscillator of joint and bristle, from which the terms in T cancel: dτ/dz times
+            // dż/dq̇ of a bristle at rest, k, and more by as much as the curve can make of it.
             Some(presliding) => {
                 let Presliding { stiffness_per_rad, damping_s, .. } = *presliding;
                 let [least, most] = self.bristle_rests();
@@ -261,9 +261,10 @@ impl Friction {
 mod tests {
     use super::*;
 
-    /// Central differences of the law over all speeds and states of the bristle do not exceed the bounds (with h = 1e-6,
-    /// to 1e-6 of them). They take together what belongs to different speeds: the curve is steepest near rest, where γ = G,
-    /// and a (z/γ)² is counted with z = G and γ = g there, which is too much by (G/g)³ for a curve with n = 1.
+    /// Central differences of the law over all speeds and states of the bristle do not exceed the bounds (with
+    /// h = 1e-6, to 1e-6 of them). They take together what belongs to different speeds: the curve is steepest near
+    /// rest, where γ = G, and a (z/γ)² is counted with z = G and γ = g there, which is too much by (G/g)³ for a curve
+    /// with n = 1.
     #[test]
     fn slopes_beside_presliding_are_bounds() {
         let drive = crate::robot::Arm::built_in("ur5").unwrap().joints[0].drive;

@@ -6,8 +6,8 @@ use super::super::assembly::Assembly;
 use super::super::effect::{Complaint, Fault, not_negative, positive, require};
 
 /// Dry friction that builds up over an angle instead of at once: τ = c (z + T ż) with ż = k (q̇ − |q̇| z), in place of
-/// c tanh(q̇/ε); the damping c T ż leaves out friction that grows with load. Without damping (T = 0) this is Dahl's model
-/// (1968).
+/// c tanh(q̇/ε); the damping c T ż leaves out friction that grows with load. Without damping (T = 0) this is Dahl's
+/// model (1968).
 ///
 /// On a joint with Stribeck friction d(q̇), the bristle holds the curve: it comes to rest at ±γ = ±(1 + d(q̇)/rc), by
 /// ż = k (q̇ − |q̇| z/γ), and the direction of dry friction is z/γ. With Coulomb, viscous and Stribeck friction alone,
@@ -39,8 +39,8 @@ impl Presliding {
         self.damping_s * self.stiffness_per_rad * (qd_rad_s - qd_rad_s.abs() * direction)
     }
 
-    /// ż = k (q̇ − |q̇| z/γ), 1/s, which is a decay towards ±γ, where the bristle is at `rest`, at the rate k |q̇|/γ. The
-    /// rate is limited to `fastest_per_s`.
+    /// ż = k (q̇ − |q̇| z/γ), 1/s, which is a decay towards ±γ, where the bristle is at `rest`, at the rate k |q̇|/γ.
+    /// The rate is limited to `fastest_per_s`.
     #[inline]
     pub(super) fn bristle_rate(
         &self,
@@ -55,11 +55,11 @@ impl Presliding {
 }
 
 /// Fastest decay of bristles of the stiffness k that matters, 1/s, for a joint that starts at rest with an acceleration
-/// of at most a. When the joint has moved by d after a reversal, its speed is at most √(2 a d), and the deviation of the
-/// bristle has shrunk to e^(−k d). The bristle has therefore completed its reversal (k d = 18) before the decay rate k q̇
-/// exceeds √(2 a k · 18). From then on it stays where it rests, and the rate has no effect; where a curve changes that
-/// rest, the bristle then follows it by a little more than it would (0.002 in place of 0.0014 of Coulomb friction, for
-/// k of 10 000 /rad and a curve of 0.4 that falls within 0.2 rad/s, along 11 rad/s²).
+/// of at most a. When the joint has moved by d after a reversal, its speed is at most √(2 a d), and the deviation of
+/// the bristle has shrunk to e^(−k d). The bristle has therefore completed its reversal (k d = 18) before the decay
+/// rate k q̇ exceeds √(2 a k · 18). From then on it stays where it rests, and the rate has no effect; where a curve
+/// changes that rest, the bristle then follows it by a little more than it would (0.002 in place of 0.0014 of Coulomb
+/// friction, for k of 10 000 /rad and a curve of 0.4 that falls within 0.2 rad/s, along 11 rad/s²).
 pub(super) fn fastest_turn_per_s(stiffness_per_rad: f64, acceleration_rad_s2: f64) -> f64 {
     (2.0 * acceleration_rad_s2 * stiffness_per_rad * TURNED_ROUND).sqrt()
 }
@@ -86,8 +86,8 @@ mod tests {
     use super::super::{Fall, Friction, Stribeck};
     use super::*;
 
-    /// The bristle with a Stribeck curve against LuGre's own equations, σ₀ ż = σ₀ (q̇ − σ₀ |q̇| z/g), τ = σ₀ z + σ₁ ż + σ₂ q̇,
-    /// along q̇ = 0.3 sin 5t: both integrated by Euler's method, in which they are the same up to rounding.
+    /// The bristle with a Stribeck curve against LuGre's own equations, σ₀ ż = σ₀ (q̇ − σ₀ |q̇| z/g), τ = σ₀ z + σ₁ ż +
+    /// σ₂ q̇, along q̇ = 0.3 sin 5t: both integrated by Euler's method, in which they are the same up to rounding.
     #[test]
     fn bristles_that_hold_a_curve_are_those_of_lugre() {
         let drive = crate::robot::Arm::built_in("ur5").unwrap().joints[0].drive;

@@ -6,8 +6,8 @@ use super::super::assembly::Assembly;
 use super::super::effect::{Complaint, Fault, finite, positive, require};
 
 /// Extra dry friction near standstill: c = rc + d exp(−|q̇/v_s|ⁿ) (Bo and Pavelescu 1982; exponent 2
-/// as in Armstrong-Hélouvry, Dupont, Canudas de Wit 1994, 1 as in Tustin 1947), or c = rc + d/(1 + |q̇/v_s|ⁿ) (exponent 2:
-/// Hess and Soom 1990). With presliding on the same joint, its bristles hold the curve
+/// as in Armstrong-Hélouvry, Dupont, Canudas de Wit 1994, 1 as in Tustin 1947), or c = rc + d/(1 + |q̇/v_s|ⁿ) (exponent
+/// 2: Hess and Soom 1990). With presliding on the same joint, its bristles hold the curve
 /// ([`Presliding`](super::Presliding)).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

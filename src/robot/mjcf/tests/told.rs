@@ -37,7 +37,8 @@ fn damping_that_mujoco_works_out_itself_is_told() {
     assert!(lines.iter().any(is_told), "{lines:?}");
 }
 
-/// As in MuJoCo 4.0 (`passive`: as in older versions): the flag `constraint` disables dry friction as much as its own flag does.
+/// As in MuJoCo 4.0 (`passive`: as in older versions): the flag `constraint` disables dry friction as much as its own
+/// flag does.
 #[test]
 fn what_flags_disable_is_zero_and_told() {
     let of = |flags: &str, joint: &str| {
