@@ -33,6 +33,11 @@ fn a_small_design_writes_every_output() {
     let margins = json["design"]["margins"].as_array().unwrap();
     assert!(margins.len() > 24 && margins.iter().all(|m| m["free"].as_f64().unwrap() >= 0.0));
     let page = folder.read("t.html");
+    let design = &json["design"];
+    let [all, known] = ["parameters", "parameters_known"].map(|key| design[key].as_u64().unwrap());
+    let precision = format!("{known} of {all} parameters will be known better than their own size");
+    assert!(known > 0 && known <= all && page.contains(&precision), "{precision}");
+    assert!(design["known_sigma_90"].as_f64().unwrap() < 1.0, "{design}");
     assert!(page.contains("forearm and wrist 3") && page.contains("The swept arm"));
     assert!(page.contains(slowed));
     // What is played has half the speed of the design, a little more between the instants at which that was checked.

@@ -25,7 +25,7 @@ use crate::excitation::design::{
 use crate::excitation::export::{Playback, Slowed, Speed, urscript, write_csv};
 use crate::excitation::{Requirements, TRAJECTORY_SCHEMA};
 use crate::output::{check_outputs, write_atomically, write_text};
-use crate::report::excitation::{at_full_speed, page};
+use crate::report::excitation::{at_full_speed, page, precision_in_words};
 use crate::report::json::{Document, Program};
 use crate::robot::{Arm, Joint, LoadedArm};
 
@@ -219,7 +219,7 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
         other => other?,
     };
     let seconds = begun.elapsed().as_secs_f64();
-    print_summary(&base, &spec, &found, speed, seconds);
+    print_summary((&arm, &base, &spec), &found, speed, seconds);
     write_outputs(args, (&arm, &base, &spec), &found, (&program, speed, playback.as_ref()))?;
     if interrupted && found.cut_short {
         eprintln!("interrupted: what was written is the best motion found until then");
@@ -336,18 +336,21 @@ impl Rounds {
     }
 }
 
-fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, speed: Speed, seconds: f64) {
+fn print_summary(
+    (arm, base, spec): (&Arm, &BaseSet, &Specification),
+    found: &Design,
+    speed: Speed,
+    seconds: f64,
+) {
     let p = &found.prediction;
     say!(
-        "cond(ΘᵀΘ) {:.1}, columns scaled {:.2}; predicted from {} periods, {:.1} s: geometric mean σ {:.6}, relative σ \
-         median {:.2} %, 90th percentile {:.2} %",
+        "cond(ΘᵀΘ) {:.1}, columns scaled {:.2}; predicted from {} periods, {:.1} s: geometric mean σ {:.6}; {}",
         p.condition,
         p.scaled_condition,
         found.excitation.periods(),
         found.experiment.data_s,
         p.geometric_mean_sigma(),
-        100.0 * p.relative_quantile(0.5),
-        100.0 * p.relative_quantile(0.9),
+        precision_in_words(arm, base, p),
     );
     if let Some(remark) = at_full_speed(found, speed) {
         say!("{remark}");
@@ -382,7 +385,7 @@ fn write_outputs(
     found: &Design,
     (program, speed, playback): (&Program, Speed, Option<&Playback>),
 ) -> Result<(), Box<dyn Error>> {
-    let record = Record::of(arm, spec, found);
+    let record = Record::of(arm, base, spec, found);
     Document { schema: TRAJECTORY_SCHEMA, program, body: &record }.write(&args.out)?;
     if let Some(path) = &args.csv {
         let motion = Slowed::new(&found.excitation, speed);

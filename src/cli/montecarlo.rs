@@ -329,8 +329,10 @@ fn conclude_blind(
     output: &Outputs,
 ) -> CommandResult {
     let scores = Scores::of(merged);
-    let program = Program::started(Some(merged.header.seed), inputs);
-    output.write(SCORES_SCHEMA, &scores, program, blind::markdown, blind::page)?;
+    let seed = merged.header.seed;
+    let program = Program::started(Some(seed), inputs);
+    let markdown = |scores: &Scores, command: &str| blind::markdown(scores, command, seed);
+    output.write(SCORES_SCHEMA, &scores, program, markdown, blind::page)?;
     output.name_report();
     Ok(if scores.verdict == Verdict::Fail { Outcome::Negative } else { Outcome::Done })
 }

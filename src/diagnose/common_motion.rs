@@ -32,6 +32,7 @@ use fourier::Complex64;
 
 use super::friction_drift::FrictionDrift;
 use super::load::load_along;
+use super::mean_spectrum::{BAND, Band, MeanSpectrum};
 use super::scene::equivalent_arm;
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion};
@@ -114,8 +115,6 @@ pub fn noise_of_mean(regression: &Regression) -> Option<JointSignals> {
     Some(JointSignals::from_fn(panels.len(), n, |j, k| (scatter[j][k] * share).sqrt()))
 }
 
-/// Number of neighbouring harmonics that are judged together.
-const BAND: usize = 8;
 /// Least ratio of a band's power in the mean of the periods to the power of the noise in that mean: from here on the
 /// band contains more motion than noise.
 const STANDS_OUT: f64 = 2.0;
@@ -127,6 +126,7 @@ const NEAR_S: f64 = 0.04;
 
 /// Bands of harmonics in which a motion is kept.
 struct Bands {
+    /// Whether each band is kept, from harmonic 1 on.
     kept: Vec<bool>,
     clock: FineClock,
 }
@@ -136,21 +136,10 @@ impl Bands {
     /// known from the scatter between the periods.
     fn that_stand_out(y: &[f64], n: usize) -> Self {
         let clock = FineClock::new(n, 1);
-        let periods: Vec<Vec<Complex64>> =
-            y.chunks_exact(n).map(|period| clock.spectrum(period)).collect();
-        let count = periods.len() as f64;
-        // Power of a harmonic in the mean, and of the noise in that mean.
-        let power = |h: usize| {
-            let mean = periods.iter().map(|spectrum| spectrum[h]).sum::<Complex64>() / count;
-            let off = periods.iter().map(|spectrum| (spectrum[h] - mean).norm_sqr()).sum::<f64>();
-            [mean.norm_sqr(), off / (count * (count - 1.0).max(1.0))]
-        };
-        let powers: Vec<[f64; 2]> = (1..n / 2 + 1).map(power).collect();
-        let stands_out = |band: &[[f64; 2]]| {
-            let sum = |which: usize| band.iter().map(|power| power[which]).sum::<f64>();
-            sum(0) >= STANDS_OUT * sum(1)
-        };
-        Self { kept: powers.chunks(BAND).map(stands_out).collect(), clock }
+        let stands_out = |band: Band| band.power >= STANDS_OUT * band.noise;
+        // The mean velocity, harmonic 0, is always kept.
+        let kept = MeanSpectrum::of(&clock, y).bands(1).map(stands_out).collect();
+        Self { kept, clock }
     }
 
     /// One period of a motion, reduced to the bands that are kept.

@@ -44,6 +44,11 @@ const GO_TOGETHER: f64 = 0.5;
 pub(super) const MOVES_RAD_S: f64 = 0.01;
 /// Share of rows that an ordinary recorder misses; this is not reported.
 const MISSED: f64 = 2e-3;
+/// What is said of rows that are missing, and of rows that repeat the one before in all channels of the arm or of one
+/// joint. By these words the replay knows them.
+pub(super) const MISSING: &str = "samples that are missing";
+/// See [`MISSING`].
+pub(super) const REPEATED: &str = "samples that repeat the one before";
 
 /// The faults of a record.
 pub struct Faults {
@@ -206,7 +211,7 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
 }
 
 /// Rows of a moving arm that repeat the row before in every channel.
-pub(super) fn repeats(m: &Measurement) -> Vec<usize> {
+fn repeats(m: &Measurement) -> Vec<usize> {
     let channels = [m.q_rad, m.qd_rad_s, m.torque_nm];
     let moves =
         |k: usize| (0..m.q_rad.joints()).any(|j| m.qd_rad_s.joint(j)[k].abs() > MOVES_RAD_S);
@@ -215,18 +220,22 @@ pub(super) fn repeats(m: &Measurement) -> Vec<usize> {
     (1..m.time_s.len()).filter(|&k| moves(k) && channels.iter().all(|s| same(s, k))).collect()
 }
 
-/// Whole rows that are missing or repeated, in words.
-pub(super) const MISSING_OR_REPEATED: &str = "samples that are missing or repeat the one before";
-
 /// Rows that repeat the one before, or that are missing according to the time stamps.
 fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     let step_s = step_s(m);
     let missing: f64 =
         (1..m.time_s.len()).map(|k| missing_steps(m.time_s, k, step_s).round()).sum();
-    let fraction = (missing + repeats.len() as f64) / (missing + m.time_s.len() as f64);
+    let repeated = repeats.len() as f64;
+    let share = |rows: f64| rows / (missing + m.time_s.len() as f64);
+    let fraction = share(missing + repeated);
     (fraction > MISSED).then(|| {
+        let words = match [missing, repeated].map(|rows| share(rows) > MISSED) {
+            [true, false] => MISSING,
+            [false, true] => REPEATED,
+            _ => "samples that are missing or repeat the one before",
+        };
         let parameters = [("fraction", Estimate::exact(fraction, ""))];
-        Cause::certain(Kind::DroppedSamples, None, MISSING_OR_REPEATED, f64::INFINITY, &parameters)
+        Cause::certain(Kind::DroppedSamples, None, words, f64::INFINITY, &parameters)
     })
 }
 
@@ -451,7 +460,29 @@ mod tests {
         let twice = signals.map(|s| JointSignals::from_fn(2, 4000, |j, k| s.joint(j)[of(k)]));
         let Faults { causes, record, .. } = find_in(&time_s, &twice);
         assert_eq!(causes.iter().map(|f| f.kind).collect::<Vec<_>>(), [Kind::DroppedSamples]);
+        assert_eq!(causes[0].in_words, REPEATED);
         // Copies cannot be recognised where the arm is at rest.
         assert!((3960..3970).contains(&record.time_s.len()), "{}", record.time_s.len());
+    }
+
+    /// Of 4000 rows every hundredth is left out, a copy, or in turn one of both.
+    #[test]
+    fn missing_rows_are_told_from_copies() {
+        let (time_s, signals) = record(0.0, None);
+        let words = |is_missing: fn(usize) -> bool, is_copy: fn(usize) -> bool| {
+            let rows: Vec<usize> = (0..4000).filter(|k| !is_missing(*k)).collect();
+            let time_s: Vec<f64> = rows.iter().map(|k| time_s[*k]).collect();
+            let of = |k: usize| if is_copy(rows[k]) { rows[k] - 1 } else { rows[k] };
+            let [q_rad, qd_rad_s, torque_nm] = &signals
+                .each_ref()
+                .map(|s| JointSignals::from_fn(2, rows.len(), |j, k| s.joint(j)[of(k)]));
+            let m = Measurement { source: "test", time_s: &time_s, q_rad, qd_rad_s, torque_nm };
+            repeated_or_missing(&m, &repeats(&m)).unwrap().in_words
+        };
+        let is_hundredth = |k: usize| k % 100 == 99;
+        assert_eq!(words(is_hundredth, |_| false), MISSING);
+        assert_eq!(words(|_| false, is_hundredth), REPEATED);
+        let both = words(|k| k % 200 == 99, |k| k % 200 == 199);
+        assert_eq!(both, "samples that are missing or repeat the one before");
     }
 }

@@ -171,12 +171,14 @@ impl<'a> Diagnoser<'a> {
             lack_of_fit_probability: lack.map(|lack| lack.probability),
             doubt: None,
             sentences: Vec::new(),
+            behind_the_overview: Vec::new(),
             warnings: warnings.concat(),
         };
         self.question_the_arm(&mut diagnosis, &extension, &identification);
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
         diagnosis.sentences = diagnosis.in_sentences(&laws, besides);
+        diagnosis.behind_the_overview = diagnosis.about_each_of_many();
         let samples = (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
         let scene = explanation.study.scene;
         Ok(Finding {

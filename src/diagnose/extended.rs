@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::against::{self, Found, Nominal};
 use super::diagnoser::Diagnoser;
-use super::extension::{Effect, Extension};
+use super::extension::{Effect, Extension, width_of_arm};
 use super::image::{Image, Span};
 use super::intervals;
 use super::judgement::Selected;
@@ -122,7 +122,8 @@ impl Diagnoser<'_> {
             .then(|| family.size(&family.quantities(&study.scene, *site, *shape, coefficients)))
             .flatten()
             .and_then(|size| parameters.get(size.name));
-        let nothing = family.without_effect(&study.scene);
+        let of_arm = width_of_arm(&extension.effects, effect, study.families).unwrap_or(0.0);
+        let nothing = family.without_effect(&study.scene) + of_arm;
         let may_be_none = size.is_some_and(|size| size.holds(nothing));
         let mut cause = Cause {
             kind: family.kind(),

@@ -34,6 +34,22 @@ pub struct Effect {
     pub absorbed: Vec<f64>,
 }
 
+/// By how much the width over which friction turns round is another for the arm as a whole, rad/s, if `effect` is such a
+/// width of one joint: the joint's change adds to it. `None` for all other effects, and where the arm has none among
+/// `effects`.
+pub(super) fn width_of_arm(
+    effects: &[Effect],
+    effect: &Effect,
+    families: &[Box<dyn Candidate>],
+) -> Option<f64> {
+    let is_width = |effect: &Effect| families[effect.family].kind() == Kind::ReversalWidth;
+    if !is_width(effect) || effect.site.is_none() {
+        return None;
+    }
+    let of_arm = effects.iter().find(|other| is_width(other) && other.site.is_none())?;
+    of_arm.coefficients.first().copied()
+}
+
 /// Standard deviation of the coefficients of [`Candidate::loose`] relative to that of the law, before any log is seen.
 ///
 /// The directions are differences to other drives and flanks that are listed as extremes, so that most arms are within

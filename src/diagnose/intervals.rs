@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::candidates::Candidate;
 use super::candidates::{Quantity, Search, Shape};
 use super::delta_method::with_reach;
-use super::extension::{Effect, Extension};
+use super::extension::{Effect, Extension, width_of_arm};
 use super::image::{Image, Span};
 use super::kind::Kind;
 use super::selection::Kept;
@@ -172,9 +172,12 @@ pub fn physical(
     };
     let form_error = family.form_error(&study.scene, effect.shape);
     let nothing = family.without_effect(&study.scene);
+    // A joint's width beside that of the arm is known better than the difference of the two, whose interval this is.
+    let of_arm = width_of_arm(effects, effect, study.families).unwrap_or(0.0);
     for own in out.values_mut() {
         own.stretch(1.0 / warm.clamp(LEAST_WARM, 1.0));
         own.widen(quantile * form_error * (own.value - nothing).abs());
+        own.shift(of_arm);
         own.keep_above(family.least());
     }
     out

@@ -1,7 +1,7 @@
 //! A log for identification: what can be corrected within its rows is corrected, and every other fault of the record is
 //! told.
 
-use super::data_faults::{self, Faults, MISSING_OR_REPEATED, repeats};
+use super::data_faults::{self, Faults, MISSING};
 use super::kind::Kind;
 use super::outliers;
 use super::record::Record;
@@ -41,7 +41,7 @@ impl Mended {
         let is_told = |fault: &&Cause| match fault.kind {
             Kind::Outliers => false,
             // Rows that are missing are told where the log is prepared.
-            Kind::DroppedSamples => fault.in_words != MISSING_OR_REPEATED || !repeats(m).is_empty(),
+            Kind::DroppedSamples => fault.in_words != MISSING,
             _ => true,
         };
         let of_fault = |fault: &Cause| {

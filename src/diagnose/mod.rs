@@ -52,6 +52,7 @@ mod judgement;
 mod kind;
 mod lateness;
 mod load;
+mod mean_spectrum;
 mod memory;
 mod mended;
 mod misfit;

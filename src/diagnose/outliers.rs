@@ -172,6 +172,16 @@ fn replace(
         .collect()
 }
 
+/// Wild readings of these channels of a joint, as the words of a cause.
+fn words_of_cause(channels: &[&str]) -> String {
+    format!("single values of {} that are far off", channels.join(" and "))
+}
+
+/// Whether a cause with these words is one of wild torques alone.
+pub fn are_of_torque_alone(in_words: &str) -> bool {
+    in_words == words_of_cause(&["torque"])
+}
+
 /// One cause for every joint with wild readings, in a record of `rows` rows.
 pub fn causes(strays: &[Strays], rows: usize) -> Vec<Cause> {
     let strays: Vec<&Strays> = strays.iter().filter(|strays| strays.are_many()).collect();
@@ -185,9 +195,8 @@ pub fn causes(strays: &[Strays], rows: usize) -> Vec<Cause> {
         wild.sort_unstable();
         wild.dedup();
         let channels: Vec<&str> = own.iter().map(|stray| stray.channel).collect();
-        let words = format!("single values of {} that are far off", channels.join(" and "));
         let parameters = [("fraction", Estimate::exact(wild.len() as f64 / rows as f64, ""))];
-        Cause::certain(Kind::Outliers, Some(joint), &words, FAR, &parameters)
+        Cause::certain(Kind::Outliers, Some(joint), &words_of_cause(&channels), FAR, &parameters)
     };
     joints.into_iter().map(of_joint).collect()
 }

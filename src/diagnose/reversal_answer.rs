@@ -58,10 +58,11 @@ impl ReversalAnswer {
         Self { sign, coulomb_nm, torque, delay }
     }
 
-    /// What the drive delivers, Nm at every tick, if the torque was recorded `late_ticks` late.
-    pub fn given_nm(&self, clock: &FineClock, late_ticks: f64) -> Vec<f64> {
-        let c = self.coefficients(clock, (&self.sign, late_ticks));
-        self.sum_nm(c.as_deref(), (&self.sign, 0.0), 1)
+    /// What the drive delivers, Nm at every tick, if the torque was recorded on time.
+    pub fn given_nm(&self, clock: &FineClock) -> Vec<f64> {
+        let on_time = (&*self.sign, 0.0);
+        let c = self.coefficients(clock, on_time);
+        self.sum_nm(c.as_deref(), on_time, 1)
     }
 
     /// Change of what the drive delivers by the `lateness` of its record, in ticks; Nm at every sample of `clock`.
@@ -168,12 +169,11 @@ mod tests {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
-    /// By whatever fraction of a sample the torque is late, the answer is that of a torque recorded on time.
+    /// By whatever fraction of a sample the torque is late, the answer tells how its record differs from one on time.
     #[test]
     fn a_late_torque_tells_what_the_drive_gave() {
         for late in [0.0, 3.0, 5.5, -7.25, 20.0] {
             let (clock, answer, truth) = answer(&[(0.7, 0.0), (0.2, -16.0)], late);
-            assert!(off(&answer.given_nm(&clock, late), &truth) < 1e-9, "{late}");
             let [delayed, now] = [late, 0.0].map(|ticks| shifted(&truth, ticks, TICKS));
             let change: Vec<f64> = delayed.iter().zip(now).map(|(a, b)| a - b).collect();
             assert!(
@@ -181,16 +181,25 @@ mod tests {
                 "{late}"
             );
         }
-        // A late torque that is taken for one on time tells another course between the samples.
-        let (clock, answer, truth) = answer(&[(1.0, 0.0)], 8.0);
-        assert!(off(&answer.given_nm(&clock, 0.0), &truth) > 1.0);
+    }
+
+    /// A torque recorded on time tells what the drive gave between the samples as well. A late one that is taken for
+    /// one on time tells another course there.
+    #[test]
+    fn a_torque_on_time_tells_the_course_between_samples() {
+        let off_truth = |shares: &[(f64, f64)], late: f64| {
+            let (clock, answer, truth) = answer(shares, late);
+            off(&answer.given_nm(&clock), &truth)
+        };
+        assert!(off_truth(&[(0.7, 0.0), (0.2, -16.0)], 0.0) < 1e-9);
+        assert!(off_truth(&[(1.0, 0.0)], 8.0) > 1.0);
     }
 
     #[test]
     fn a_drive_of_which_nothing_is_told_gives_friction_what_it_takes() {
         let (clock, answer, _) = answer(&[], 0.0);
         let dry: Vec<f64> = answer.sign.iter().map(|s| 8.0 * s).collect();
-        assert_eq!(answer.given_nm(&clock, 0.0), dry);
+        assert_eq!(answer.given_nm(&clock), dry);
         let change: Vec<f64> = shifted(&dry, 8.0, TICKS)
             .iter()
             .zip(dry.iter().step_by(TICKS))
@@ -199,7 +208,7 @@ mod tests {
         assert!(off(&answer.change_nm(&clock, Lateness::Delay(8.0)), &change) < 1e-12);
         // Nor does the torque of a joint that does not reverse tell anything.
         let still = ReversalAnswer { sign: vec![1.0; N * TICKS], ..answer };
-        assert_eq!(still.given_nm(&clock, 0.0), vec![8.0; N * TICKS]);
+        assert_eq!(still.given_nm(&clock), vec![8.0; N * TICKS]);
     }
 
     #[test]

@@ -52,6 +52,14 @@ impl Diagnosis {
         out
     }
 
+    /// The sentences about single causes, if there are so many that one sentence gives an overview; otherwise none.
+    pub(super) fn about_each_of_many(&self) -> Vec<String> {
+        match told::overview(&self.causes) {
+            Some(_) => told::in_sentences(&self.causes, self.noise_floor_nm.is_some()),
+            None => Vec::new(),
+        }
+    }
+
     /// The sentences about the causes, and about what is left beside them.
     fn about_causes(&self, laws: &[Option<usize>]) -> Vec<String> {
         let is_left = self.unexplained.is_some() && self.noise_floor_nm.is_some();
@@ -228,7 +236,8 @@ impl Estimate {
         pair(self.value, 0.5 * (high - low), self.unit)
     }
 
-    fn is_uneven(&self) -> bool {
+    /// Whether the interval reaches so much farther to one side that `value ± half` would misstate it.
+    pub(crate) fn is_uneven(&self) -> bool {
         let [below, above] = self.ci95.map(|end| (end - self.value).abs());
         above > UNEVEN * below || below > UNEVEN * above
     }

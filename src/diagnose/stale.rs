@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::data_faults::MOVES_RAD_S;
+use super::data_faults::{MOVES_RAD_S, REPEATED};
 use super::kind::Kind;
 use super::record::Record;
 use super::verdict::{Cause, Estimate};
@@ -38,7 +38,8 @@ const SAME: f64 = 1e-4;
 /// twentieth of the changes are smaller than a tenth of it.
 const SELDOM: f64 = 0.05;
 const COARSE: f64 = 0.5;
-/// If more than this share of the stale rows of every joint is common to all joints, the whole recorder hangs.
+/// If more than this share of the stale rows of every joint is common to all joints, the whole recorder hangs; and if
+/// more than this share of those of every channel is common to all channels of a joint, all of the joint does.
 const ALIKE: f64 = 0.9;
 
 /// Names of the channels of one joint.
@@ -58,6 +59,19 @@ impl OfJoint {
     fn rows(&self) -> Vec<usize> {
         in_order(self.readings.iter().chain([&self.hangs]).flatten().copied())
     }
+
+    /// Whether all channels repeat the same rows.
+    fn is_of_whole_rows(&self) -> bool {
+        self.hangs.is_empty() && are_alike(&self.readings)
+    }
+}
+
+/// Whether these lists of rows, each in ascending order, are mostly one ([`ALIKE`]).
+fn are_alike(lists: &[Vec<usize>]) -> bool {
+    let is_in_all = |row: &&usize| lists.iter().all(|other| other.binary_search(row).is_ok());
+    let common = lists.first().map_or(0, |first| first.iter().filter(is_in_all).count());
+    let most = lists.iter().map(Vec::len).max().unwrap_or(0);
+    most > 0 && common as f64 > ALIKE * most as f64
 }
 
 /// Each of `rows` once, in ascending order.
@@ -115,11 +129,6 @@ pub fn mend(record: &mut Record) -> StaleReadings {
 /// One cause for all joints if they repeat the same rows, else one cause for every joint that repeats any.
 fn causes(found: &[OfJoint], samples: usize) -> Vec<Cause> {
     let rows: Vec<Vec<usize>> = found.iter().map(OfJoint::rows).collect();
-    let said = |joint: Option<usize>, rows: &[usize], channels: String| {
-        let parameters = [("fraction", Estimate::exact(rows.len() as f64 / samples as f64, ""))];
-        let words = format!("readings of the {channels} that repeat the one before");
-        Cause::certain(Kind::DroppedSamples, joint, &words, f64::INFINITY, &parameters)
-    };
     let channels = |stale: &[&OfJoint]| {
         let is_stale = |c: usize| {
             stale.iter().any(|s| !s.readings[c].is_empty() || c == 2 && !s.hangs.is_empty())
@@ -127,15 +136,20 @@ fn causes(found: &[OfJoint], samples: usize) -> Vec<Cause> {
         let names: Vec<&str> = (0..3).filter(|c| is_stale(*c)).map(|c| CHANNELS[c]).collect();
         names.join(" and ")
     };
-    let is_in_all = |row: &&usize| rows.iter().all(|other| other.binary_search(row).is_ok());
-    let common = rows.first().map_or(0, |first| first.iter().filter(is_in_all).count());
-    let most = rows.iter().map(Vec::len).max().unwrap_or(0);
-    if most > 0 && rows.len() > 1 && common as f64 > ALIKE * most as f64 {
+    let said = |joint: Option<usize>, rows: &[usize], stale: &[&OfJoint]| {
+        let parameters = [("fraction", Estimate::exact(rows.len() as f64 / samples as f64, ""))];
+        let words = match stale.iter().all(|s| s.is_of_whole_rows()) {
+            true => REPEATED.to_owned(),
+            false => format!("readings of the {} that repeat the one before", channels(stale)),
+        };
+        Cause::certain(Kind::DroppedSamples, joint, &words, f64::INFINITY, &parameters)
+    };
+    if rows.len() > 1 && are_alike(&rows) {
         let all: Vec<&OfJoint> = found.iter().collect();
-        return vec![said(None, &rows[0], channels(&all))];
+        return vec![said(None, &rows[0], &all)];
     }
     let stale = found.iter().zip(&rows).filter(|(_, rows)| !rows.is_empty());
-    stale.map(|(stale, rows)| said(Some(stale.joint), rows, channels(&[stale]))).collect()
+    stale.map(|(stale, rows)| said(Some(stale.joint), rows, &[stale])).collect()
 }
 
 fn of_joint(record: &Record, joint: usize) -> OfJoint {
@@ -358,6 +372,23 @@ mod tests {
         // readings go unseen.
         let left_out = (before - record.time_s.len()) as f64 / before as f64;
         assert!((0.03..0.06).contains(&left_out), "{left_out}");
+    }
+
+    /// One in ten rows repeats angle, velocity and torque of the one before, while the joint moves.
+    #[test]
+    fn a_joint_that_repeats_all_of_its_readings_repeats_rows() {
+        let mut record = record(4.0, 0.3);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let Record { q_rad, qd_rad_s, torque_nm, .. } = &mut record;
+        let mut channels = [q_rad, qd_rad_s, torque_nm].map(|signals| signals.joint_mut(0));
+        for k in 1..channels[1].len() {
+            if channels[1][k].abs() > 0.05 && rng.random_bool(0.1) {
+                channels.iter_mut().for_each(|y| y[k] = y[k - 1]);
+            }
+        }
+        let causes = mend(&mut record).causes;
+        let told: Vec<_> = causes.iter().map(|c| (c.kind, c.joint, c.in_words.as_str())).collect();
+        assert_eq!(told, [(Kind::DroppedSamples, Some(1), REPEATED)]);
     }
 
     /// A cubic through its good neighbours puts a smooth angle back to where it was, as is done where too many rows are

@@ -51,6 +51,12 @@ impl Estimate {
         self.ci95 = self.ci95.map(|end| self.value + factor * (end - self.value));
     }
 
+    /// Moves the value and its interval by `change`.
+    pub(super) fn shift(&mut self, change: f64) {
+        self.value += change;
+        self.ci95 = self.ci95.map(|end| end + change);
+    }
+
     /// Raises the value and the ends of the interval to `least` where they lie below it.
     pub(super) fn keep_above(&mut self, least: f64) {
         self.value = self.value.max(least);
@@ -324,6 +330,10 @@ pub struct Diagnosis {
     pub doubt: Option<Doubt>,
     /// The result in sentences.
     pub sentences: Vec<String>,
+    /// Those of the sentences that are about single causes, if another sentence gives an overview of them; otherwise
+    /// none. A page folds them.
+    #[serde(skip)]
+    pub behind_the_overview: Vec<String>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }

@@ -101,9 +101,10 @@ impl Calibration {
     ///
     /// Each statistic gets an interval at confidence 1 − α/(number of claims × number of statistics in the claim)
     /// (Bonferroni), from the binomial, Student's or χ² distribution for the tally's number of trials, so that the
-    /// intervals of a handful of trials are as wide as they have to be. A claim **fails** when an interval lies wholly
-    /// outside it, is **not evaluated** when an interval is wider than the claim, and passes otherwise. A failed trial
-    /// counts as an interval that misses the truth.
+    /// intervals of a handful of trials are as wide as they have to be; those of the ratios of σ over all parameters are
+    /// Student's of their logarithm. A claim **fails** when an interval lies wholly outside it, is **not evaluated**
+    /// when an interval is wider than the claim, and passes otherwise. A failed trial counts as an interval that misses
+    /// the truth.
     pub fn of(tally: &Tally, mean_coverage: [f64; 2]) -> Self {
         let b = tally.parameters();
         let (n, all) = (tally.succeeded as f64, tally.trials() as f64);
@@ -126,11 +127,14 @@ impl Calibration {
         let ratios: Vec<f64> =
             statistics.iter().map(|s| s.sigma_empirical / s.sigma_predicted).collect();
         let (pooled, pooled_error) = tally.pooled_ratio();
-        // Again at least the standard error for independent parameters: s/σ of one parameter has a σ of 1/√(2n).
+        // A ratio of standard deviations is positive, and a mean of squares from a few trials has a long upper tail: the
+        // interval is that of the logarithm, whose standard error is the relative one of the ratio (delta method). With
+        // h = t · error/ratio it is ratio · e^±h, to first order ratio ± t · error. Again the error is at least that of
+        // independent parameters: s/σ of one parameter has a σ of 1/√(2n).
         let least = (0.5 / (n * b as f64)).sqrt();
         let around = |ratio: f64, error: f64| {
-            let half = t_single * error.max(least);
-            [(None, ratio, [ratio - half, ratio + half])]
+            let factor = (t_single * (error / ratio).max(least)).exp();
+            [(None, ratio, [ratio / factor, ratio * factor])]
         };
         let ratio_interval = |ratio: f64, alpha: f64| {
             // (n − 1) s²/σ² ~ χ²(n − 1).
@@ -395,6 +399,40 @@ mod tests {
         assert_eq!(of(&[f64::NAN]), Verdict::NotEvaluated);
         assert_eq!(of(&[1.0, f64::NAN, 1.1]), Verdict::NotEvaluated);
         assert_eq!(of(&[f64::NAN, 2.0]), Verdict::Fail);
+    }
+
+    /// One error of 30 σ among twenty trials: the interval is as long as that asks for, but no ratio of σ is negative.
+    /// Its ends are the ratio over and times the same factor, up to round-off.
+    #[test]
+    fn a_ratio_of_few_trials_is_positive() {
+        let mut tally = Tally::new(1);
+        for trial in 0..20 {
+            let z = match trial {
+                0 => 30.0,
+                _ if trial % 2 == 0 => 1.0,
+                _ => -1.0,
+            };
+            let parameters = vec![Outcome { z, sigma: 1.0, quantile_95: 1.96 }];
+            tally.add(&Outcomes { parameters, distance: Some(z * z) });
+        }
+        for statistic in [Statistic::PooledRatio, Statistic::JointRatio] {
+            let check = check_of(&tally, statistic, claims::MEAN_COVERAGE);
+            let ([low, high], ratio) = (check.interval, check.value);
+            assert_eq!(check.verdict, Verdict::NotEvaluated);
+            assert!(0.0 < low && low < 1.0 && high > 2.0 * ratio, "{check:?}");
+            assert!((low * high / ratio.powi(2) - 1.0).abs() < 1e-12, "{check:?}");
+        }
+    }
+
+    /// Trials that scatter alike leave the least error, 1/√(2 · 1000 · 20) = 0.005. The ends of the interval differ from
+    /// those of ratio ± h · ratio by less than the next term of the exponential, h²/2 · e^h with e^h < 1.02.
+    #[test]
+    fn the_interval_of_a_ratio_is_symmetric_where_it_is_narrow() {
+        let check = check_of(&all_held(0, None), Statistic::PooledRatio, claims::MEAN_COVERAGE);
+        let h = two_sided_quantile(FALSE_FAILURE_RATE / CHECKS, 999.0) * 0.005;
+        let ends = [1.0 - h, 1.0 + h].map(|share| share * check.value);
+        let off = [ends[0] - check.interval[0], ends[1] - check.interval[1]];
+        assert!(off.iter().all(|off| off.abs() < 0.51 * h * h * check.value), "{off:?} {check:?}");
     }
 
     /// A claim does not pass if no trial provides evidence about it.

@@ -2,7 +2,9 @@
 
 use super::json::Program;
 use super::plot::{Axis, Colour, Grid, Mark};
-use super::{Column, Page, ReportError, Section, Status, Table, Verdict, file_name, replay};
+use super::{
+    Column, Folded, Page, ReportError, Section, Status, Table, Verdict, file_name, replay,
+};
 use crate::diagnose::{self, Cause, DetectionLimit, Diagnosis, Finding, Kind, class_holds};
 use crate::number::{NONE, percent, resolved, significant};
 use crate::robot::Arm;
@@ -35,7 +37,8 @@ pub fn cause_table(diagnosis: &Diagnosis) -> Table {
                 place,
                 (*name).to_owned(),
                 resolved(estimate.value, width),
-                format!("{low} … {high}"),
+                // A value that is known exactly has no interval.
+                if width == 0.0 { "–".to_owned() } else { format!("{low} … {high}") },
                 estimate.unit.to_owned(),
                 once(confidence(cause)),
                 once(significant(cause.strength, 3)),
@@ -167,12 +170,16 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
         diagnose::Verdict::CauseNamed => Status::Warn,
         diagnose::Verdict::Unexplained | diagnose::Verdict::Contradicted => Status::Bad,
     };
-    let mut sentences = diagnosis.sentences.iter().cloned();
+    let (folded, shown): (Vec<String>, Vec<String>) = diagnosis
+        .sentences
+        .iter()
+        .cloned()
+        .partition(|sentence| diagnosis.behind_the_overview.contains(sentence));
+    let mut shown = shown.into_iter();
     let list =
         |values: &[f64]| values.iter().map(|v| significant(*v, 3)).collect::<Vec<_>>().join(", ");
-    let mut facts: Vec<String> = Vec::new();
-    let sentence = sentences.next().unwrap_or_default();
-    facts.extend(sentences);
+    let sentence = shown.next().unwrap_or_default();
+    let mut facts: Vec<String> = shown.collect();
     facts.push(format!(
         "Residual rms per joint: {} Nm before, {} Nm with the causes in the model.",
         list(&diagnosis.before.rms_nm),
@@ -188,8 +195,16 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
     let verdict = Verdict { status, sentence, facts };
     let subtitle = format!("{}, {}", arm.name, diagnosis.log);
     let mut page = Page::new("What the model gets wrong", subtitle, verdict, program);
-    for cause in &diagnosis.causes {
-        page.push(cause_section(finding, cause)?);
+    let are_many = !folded.is_empty();
+    page.folded =
+        are_many.then(|| Folded { title: "All causes in words".to_owned(), facts: folded });
+    let each = diagnosis.causes.iter().map(|cause| cause_section(finding, cause));
+    let each = each.collect::<Result<Vec<Section>, ReportError>>()?;
+    if are_many {
+        // Sections of their own would be a long way down to everything behind them.
+        page.push(each.into_iter().fold(Section::new("Cause by cause"), Section::details));
+    } else {
+        page.extend(each);
     }
     page = page.with_warnings(&diagnosis.warnings);
     if let Some(replay) = &diagnosis.replay {

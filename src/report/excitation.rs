@@ -1,9 +1,11 @@
 //! The page of `armid excite`: the motion with its limits, the predicted accuracy, and the volume the arm sweeps.
 
 use crate::base::BaseSet;
-use crate::excitation::design::{Design, Specification};
+use crate::excitation::design::{Design, Prediction, Specification};
 use crate::excitation::export::Speed;
 use crate::excitation::{ClearanceModel, LimitKind, Reference};
+use crate::identify::covariance::Z_95;
+use crate::identify::not_identified;
 use crate::number;
 use crate::robot::Arm;
 
@@ -32,6 +34,43 @@ pub fn at_full_speed(found: &Design, speed: Speed) -> Option<String> {
     })
 }
 
+/// Names of the base parameters that the motion is predicted to leave open, judged as `armid identify` does: their 95 %
+/// intervals are wider than anything an arm of this size could have.
+pub fn open_parameters(arm: &Arm, base: &BaseSet, prediction: &Prediction) -> Vec<String> {
+    let half_widths: Vec<f64> = prediction.sigma.iter().map(|sigma| Z_95 * sigma).collect();
+    let open = not_identified(arm, base, &half_widths);
+    open.into_iter().map(|k| base.name(k).to_owned()).collect()
+}
+
+/// How well the parameters will be known, in words. Nominal values near zero have no meaningful relative σ, and are
+/// counted beside the others.
+pub fn precision_in_words(arm: &Arm, base: &BaseSet, prediction: &Prediction) -> String {
+    let (known, all) = (prediction.known(), prediction.sigma.len());
+    let mut words = format!("{known} of {all} parameters will be known better than their own size");
+    if known > 0 {
+        let [half, most] = [0.5, 0.9].map(|share| prediction.known_quantile(share));
+        words += &format!(
+            ", half of these to {} or better, nine tenths to {}",
+            number::percent(half, 2),
+            number::percent(most, 2)
+        );
+    }
+    if known < all {
+        words += &format!(
+            "; of the other {}, the nominal value is zero or below the predicted σ",
+            all - known
+        );
+    }
+    let open = open_parameters(arm, base, prediction);
+    if !open.is_empty() {
+        words += &format!(
+            "; open, with intervals wider than anything an arm of this size could have: {}",
+            open.join(", ")
+        );
+    }
+    words
+}
+
 /// The report page of a design that is played at `speed`.
 pub fn page(
     arm: &Arm,
@@ -43,7 +82,8 @@ pub fn page(
 ) -> Result<Page, ReportError> {
     let is_watched = !ClearanceModel::new(arm).is_empty();
     let motion = Samples::of(arm, found);
-    let verdict = verdict(spec, found, speed, is_watched);
+    let precision = precision_in_words(arm, base, &found.prediction);
+    let verdict = verdict(spec, found, (speed, is_watched), &precision);
     let mut page = Page::new("Excitation", subtitle(arm, found), verdict, program);
     page.push(the_motion(arm, spec, &motion, is_watched)?);
     page.push(what_it_will_tell(arm, base, found));
@@ -65,7 +105,12 @@ fn subtitle(arm: &Arm, found: &Design) -> String {
     )
 }
 
-fn verdict(spec: &Specification, found: &Design, speed: Speed, is_watched: bool) -> Verdict {
+fn verdict(
+    spec: &Specification,
+    found: &Design,
+    (speed, is_watched): (Speed, bool),
+    precision: &str,
+) -> Verdict {
     let p = &found.prediction;
     let worst = found.margins.worst();
     let limits = match is_watched {
@@ -73,11 +118,9 @@ fn verdict(spec: &Specification, found: &Design, speed: Speed, is_watched: bool)
         false => format!("A motion inside every limit of the joints ({NO_CLEARANCE})"),
     };
     let prediction = format!(
-        "Predicted from {} periods, {:.1} s of data: half of the parameters to {} or better, nine tenths to {}.",
+        "Predicted from {} periods, {:.1} s of data: {precision}.",
         found.excitation.periods(),
-        found.experiment.data_s,
-        number::percent(p.relative_quantile(0.5), 2),
-        number::percent(p.relative_quantile(0.9), 2)
+        found.experiment.data_s
     );
     let conditions = format!(
         "cond(ΘᵀΘ) {}; with columns of unit length {}.",
@@ -137,7 +180,8 @@ fn what_it_will_tell(arm: &Arm, base: &BaseSet, found: &Design) -> Section {
     Section::new("What it will tell")
         .paragraph(
             "Standard deviations by weighted least squares from white torque noise, before any experiment is run. \
-             Parameters that are zero for this arm have no relative σ.",
+             Parameters that are zero for this arm have no relative σ; where it exceeds 100 %, the nominal value is smaller \
+             than σ, and the motion tells how small the parameter is.",
         )
         .table(parameters(arm, base, found), "")
 }

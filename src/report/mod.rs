@@ -26,7 +26,7 @@ mod status;
 mod table;
 
 pub use error::ReportError;
-pub use page::{Page, Section, Verdict};
+pub use page::{Folded, Page, Section, Verdict};
 pub use status::Status;
 pub use table::{Align, Column, Row, Table};
 

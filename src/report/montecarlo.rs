@@ -86,7 +86,7 @@ pub fn check_table(summary: &Summary) -> Table {
         Column::text("verdict"),
     ]);
     for check in &summary.checks {
-        let range = |[low, high]: [f64; 2]| format!("{low:.3} … {high:.3}");
+        let range = |[low, high]: [f64; 2]| format!("{} … {}", end(low), end(high));
         let measured = |text: String| if check.reason.is_none() { text } else { "–".to_owned() };
         let reason = check.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"));
         table.push_judged(
@@ -102,6 +102,17 @@ pub fn check_table(summary: &Summary) -> Table {
         );
     }
     table
+}
+
+/// An end of an interval. That of a ratio of σ from a few trials may be any power of ten, or beyond all numbers.
+fn end(value: f64) -> String {
+    if value.is_infinite() {
+        "∞".to_owned()
+    } else if value.abs() < 1e6 {
+        format!("{value:.3}")
+    } else {
+        significant(value, 3)
+    }
 }
 
 /// Facts that support the verdict.

@@ -34,10 +34,21 @@ pub struct Page {
     pub subtitle: String,
     /// The banner.
     pub verdict: Verdict,
+    /// Further facts in the banner, collapsed; `None` if all are shown.
+    pub folded: Option<Folded>,
     /// The sections, in reading order.
     pub sections: Vec<Section>,
     /// Origin of the result, for the footer.
     pub program: Program,
+}
+
+/// Facts that are collapsed behind a title.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Folded {
+    /// The title.
+    pub title: String,
+    /// The facts.
+    pub facts: Vec<String>,
 }
 
 /// A section of the page with a heading.
@@ -127,6 +138,7 @@ impl Page {
             title: title.into(),
             subtitle: subtitle.into(),
             verdict,
+            folded: None,
             sections: Vec::new(),
             program,
         }
@@ -204,6 +216,7 @@ mod tests {
             .paragraph(HOSTILE)
             .note(Status::Bad, HOSTILE)
             .table(table, HOSTILE);
+        page.folded = Some(Folded { title: HOSTILE.into(), facts: vec![HOSTILE.into()] });
         page.push(section.figure(svg, HOSTILE).details(hidden));
         page.push(Section::new("Empty"));
         page
@@ -254,6 +267,21 @@ mod tests {
         let html = page().with_warnings(&["rows are missing".to_owned()]).to_html().unwrap();
         assert!(html.contains("<p class=\"note warn\">rows are missing</p>"), "{html}");
         assert!(page().with_warnings(&[]).sections.is_empty());
+    }
+
+    /// Facts that are folded stand behind those that are shown, in the banner.
+    #[test]
+    fn facts_can_be_folded() {
+        let mut page = page();
+        page.verdict.facts = vec!["shown".into()];
+        page.folded = Some(Folded { title: "more".into(), facts: vec!["folded".into()] });
+        let html = page.to_html().unwrap();
+        let at = |text: &str| html.find(text).unwrap_or_else(|| panic!("{text} in {html}"));
+        let order =
+            ["<li>shown</li>", "<summary>more</summary>", "<li>folded</li>", "<nav"].map(at);
+        assert!(order.is_sorted(), "{order:?}");
+        page.folded = None;
+        assert!(!page.to_html().unwrap().contains("folded"));
     }
 
     #[test]

@@ -12,7 +12,7 @@ pub fn table(replay: &Replay) -> Table {
         Column::number("joint", ""),
         Column::number("torque off, before", "Nm"),
         Column::number("after", "Nm"),
-        Column::number("noise floor", "Nm"),
+        Column::number("torque noise of the mean", "Nm"),
         Column::number("tracking off, before", "mrad"),
         Column::number("after", "mrad"),
     ]);
@@ -43,8 +43,9 @@ pub fn section(replay: &Replay) -> Result<Section, ReportError> {
     for log in std::iter::once(&replay.log).chain(&replay.held_out) {
         let j = log.worst_joint();
         let noise = log.noise_nm.as_ref();
-        let floor =
-            noise.map_or(String::new(), |n| format!(", noise floor {} Nm", significant(n[j], 2)));
+        let of_the_mean = noise.map_or(String::new(), |n| {
+            format!(", torque noise of the mean {} Nm", significant(n[j], 2))
+        });
         let [before, after] = [&log.before, &log.after].map(|d| significant(d.torque_rms_nm[j], 3));
         let share = log.removed_fraction.map_or(String::new(), |share| {
             format!(
@@ -56,7 +57,7 @@ pub fn section(replay: &Replay) -> Result<Section, ReportError> {
             figure(log, j)?,
             format!(
                 "{}: torque of joint {} over {}, and what the simulation is off by: {before} Nm rms before, \
-                 {after} Nm after{floor}.{share}",
+                 {after} Nm after{of_the_mean}.{share}",
                 log.log,
                 j + 1,
                 if noise.is_some() { "the mean period" } else { "the run, low-passed" },

@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 
+use crate::base::BaseSet;
 use crate::excitation::design::{Criterion, Design, Specification};
+use crate::report::excitation::open_parameters;
 use crate::robot::Arm;
 
 /// A trajectory and the record of its design.
@@ -25,6 +27,14 @@ struct DesignRecord {
     geometric_mean_sigma: f64,
     relative_sigma_median: f64,
     relative_sigma_90: f64,
+    /// Number of base parameters.
+    parameters: usize,
+    /// How many will be known better than their own size, with the median and the 90th percentile of their relative σ.
+    parameters_known: usize,
+    known_sigma_median: f64,
+    known_sigma_90: f64,
+    /// Names of those that would stay open.
+    not_identified: Vec<String>,
     run_in_s: f64,
     periods: usize,
     start_rad: Vec<f64>,
@@ -55,7 +65,7 @@ struct FinalistRecord {
 
 impl<'a> Record<'a> {
     /// Records the design `found` for `arm`.
-    pub(super) fn of(arm: &Arm, spec: &Specification, found: &'a Design) -> Self {
+    pub(super) fn of(arm: &Arm, base: &BaseSet, spec: &Specification, found: &'a Design) -> Self {
         let p = &found.prediction;
         let series = found.excitation.series();
         Self {
@@ -72,6 +82,11 @@ impl<'a> Record<'a> {
                 geometric_mean_sigma: p.geometric_mean_sigma(),
                 relative_sigma_median: p.relative_quantile(0.5),
                 relative_sigma_90: p.relative_quantile(0.9),
+                parameters: p.sigma.len(),
+                parameters_known: p.known(),
+                known_sigma_median: p.known_quantile(0.5),
+                known_sigma_90: p.known_quantile(0.9),
+                not_identified: open_parameters(arm, base, p),
                 run_in_s: found.excitation.run_in_s(),
                 periods: found.excitation.periods(),
                 start_rad: found.excitation.start_rad(),

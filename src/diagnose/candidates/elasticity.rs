@@ -257,6 +257,14 @@ fn stiffest_nm_rad(scene: &Scene, j: usize) -> f64 {
     scene.rotor_kg_m2[j] * (0.25 * TAU * scene.rate_hz).powi(2)
 }
 
+/// Damping of the gear relative to the critical damping of the rotor on its spring, by variant of the law.
+pub fn damping_ratio(variant: usize) -> f64 {
+    match variant.checked_sub(ON_MOTOR) {
+        Some(on_link) => LINK_DAMPING_RATIO[on_link % LINK_DAMPING_RATIO.len()],
+        None => DAMPING_RATIO,
+    }
+}
+
 /// Change of the torques on all joints when the links move as `motion`, per unit of `scale`.
 pub(super) fn give_way(scene: &Scene, motion: &Motion, scale: f64) -> Column {
     Column::everywhere(&scene.torque_change(&scene.arm, motion)).scaled(1.0 / scale)
@@ -308,8 +316,7 @@ impl Candidate for Elasticity {
             let lag = swing(scene, j, shape.variant, stiffness, Jolts::USUAL);
             return vec![lag.column(scene, j, 1.0 / stiffness)];
         }
-        let form = shape.variant - ON_MOTOR;
-        let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[form % LINK_DAMPING_RATIO.len()]);
+        let (stiffness, ratio) = (shape.value, damping_ratio(shape.variant));
         let damping = 2.0 * ratio * (stiffness * scene.rotor_kg_m2[j]).sqrt();
         let is_single = !scene.periodic;
         let load_nm = match is_single || shape.variant < WELL_KNOWN_ON_LINK {

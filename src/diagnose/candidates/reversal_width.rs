@@ -93,6 +93,7 @@ impl Candidate for ReversalWidth {
         vec![Column { parts: joints_at(scene, site).map(|j| (j, per_width(j))).collect() }]
     }
 
+    /// The width by these coefficients alone: a joint that is named beside the arm has what the arm adds as well.
     fn quantities(&self, scene: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
         vec![quantity("width_rad_s", scene.arm.friction_epsilon_rad_s + b[0], "rad/s")]
     }

@@ -93,7 +93,7 @@ pub fn beside_model(
     })
 }
 
-/// Stretches of `0..n` that begin and end with a sample that `is_far`, with at most `gap` other samples in a row in
+/// Stretches of `0..n` that begin and end with a sample that `is_far`, with fewer than `gap` other samples in a row in
 /// between.
 fn stretches(n: usize, gap: usize, is_far: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut out: Vec<Range<usize>> = Vec::new();

@@ -52,31 +52,9 @@ pub enum Compared {
 
 /// Looks for contacts by comparing repetitions, on all joints but those `left_out` (0-based).
 pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, SignalError> {
-    let rate_hz = natural_rate_hz(m.time_s)?;
-    let grid = Resampler::new(m.time_s, rate_hz, bridged_gap_s(rate_hz))?;
-    let whole = 0..grid.samples();
-    if grid.segments() != [whole] {
-        return Ok(Compared::TooFew);
-    }
-    let q_rad = grid.instants().angles(m.q_rad, m.qd_rad_s)?;
-    let Some(found) = find_period(&q_rad)? else { return Ok(Compared::TooFew) };
-    let period = found.refined_samples;
-    let edge = (EDGE_S * rate_hz) as usize;
-    let window = with_disturbed_periods(&q_rad, period, found.window, edge);
-    if ((window.len() as f64 / period + WHOLE_WITHIN) as usize) < FEWEST_PERIODS {
-        return Ok(Compared::TooFew);
-    }
-    let swings = (SWINGS_S * rate_hz) as usize;
-    let begin = if window.start > 0 { window.start + swings } else { 0 };
-    let stop =
-        if window.end < grid.samples() { window.end.saturating_sub(swings) } else { usize::MAX };
-    let joints: Vec<usize> = (0..m.torque_nm.joints()).filter(|j| !left_out.contains(j)).collect();
-    let signals = grid.instants().straight(m.torque_nm)?;
-    let between_samples = linear_at;
-    let (drift, moves) = (None, Vec::new());
-    let mut repeats =
-        Repeats { signals, between_samples, joints, window, period, rate_hz, drift, moves };
-    let window = repeats.window.clone();
+    let Some(repetitions) = Repetitions::of(m, left_out)? else { return Ok(Compared::TooFew) };
+    let Repetitions { grid, q_rad, mut repeats, inside } = repetitions;
+    let (window, period) = (repeats.window.clone(), repeats.period);
     let drift = || {
         let qd_rad_s = grid.instants().smooth(m.qd_rad_s)?.slice(window.clone());
         Ok(FrictionDrift::beside_others(qd_rad_s, period))
@@ -84,24 +62,92 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
     let (moves, of_moves) = repeats.find_moves(q_rad, drift)?;
     repeats.moves = moves;
     let time_s = grid.time_s();
+    if repeats.search(&vec![false; time_s.len()], &[], &[], 1.0)?.is_none() {
+        return Ok(Compared::Alike);
+    }
+    repeats.drift = Some(of_moves.map_or_else(drift, Ok)?);
+    let (touches, aside) = find_touches(&mut repeats, &time_s)?;
+    if touches.is_empty() {
+        return Ok(Compared::Alike);
+    }
+    let contacts = joined(touches, (TOGETHER_S * repeats.rate_hz) as usize);
+    let is_touch =
+        |touch: &&Touch| touch.samples.end > inside.start && touch.samples.start < inside.end;
+    let causes = contacts.iter().filter(is_touch).map(Touch::cause).collect();
+    let torque_nm = torque_without(m, &time_s, &repeats, &aside);
+    Ok(Compared::Touched(WithoutContacts { causes, torque_nm }))
+}
+
+/// A log with enough repetitions to be compared.
+struct Repetitions {
+    /// Its evenly spaced clock.
+    grid: Resampler,
+    /// Angles on this clock, rad.
+    q_rad: JointSignals,
+    /// Torques on this clock, whose periods are compared.
+    repeats: Repeats,
+    /// Where a touch is one: what lies wholly before or behind is due to a run-in or a stop.
+    inside: Range<usize>,
+}
+
+impl Repetitions {
+    /// Those of the log `m`, on all joints but those `left_out` (0-based); `None` if the motion does not repeat often
+    /// enough without a gap.
+    fn of(m: &Measurement, left_out: &[usize]) -> Result<Option<Self>, SignalError> {
+        let rate_hz = natural_rate_hz(m.time_s)?;
+        let grid = Resampler::new(m.time_s, rate_hz, bridged_gap_s(rate_hz))?;
+        let whole = 0..grid.samples();
+        if grid.segments() != [whole] {
+            return Ok(None);
+        }
+        let q_rad = grid.instants().angles(m.q_rad, m.qd_rad_s)?;
+        let Some(found) = find_period(&q_rad)? else { return Ok(None) };
+        let period = found.refined_samples;
+        let edge = (EDGE_S * rate_hz) as usize;
+        let window = with_disturbed_periods(&q_rad, period, found.window, edge);
+        if ((window.len() as f64 / period + WHOLE_WITHIN) as usize) < FEWEST_PERIODS {
+            return Ok(None);
+        }
+        let swings = (SWINGS_S * rate_hz) as usize;
+        let begin = if window.start > 0 { window.start + swings } else { 0 };
+        let is_stopped = window.end < grid.samples();
+        let stop = if is_stopped { window.end.saturating_sub(swings) } else { usize::MAX };
+        let repeats = Repeats {
+            signals: grid.instants().straight(m.torque_nm)?,
+            between_samples: linear_at,
+            joints: (0..m.torque_nm.joints()).filter(|j| !left_out.contains(j)).collect(),
+            window,
+            period,
+            rate_hz,
+            drift: None,
+            moves: Vec::new(),
+        };
+        Ok(Some(Self { grid, q_rad, repeats, inside: begin..stop }))
+    }
+}
+
+/// Finds the touches in a log with the time stamps `time_s`, the clearest first, and whether each of its samples is set
+/// aside because of them.
+///
+/// A move without a torque is removed from `repeats`, and so is a joint whose torque shows rounding alone.
+fn find_touches(
+    repeats: &mut Repeats,
+    time_s: &[f64],
+) -> Result<(Vec<Touch>, Vec<bool>), SignalError> {
     let mut touches: Vec<Touch> = Vec::new();
     let mut known: Vec<Push> = Vec::new();
     let mut looked_at: Vec<Range<usize>> = Vec::new();
     let mut aside = vec![false; time_s.len()];
-    if repeats.search(&aside, &known, &looked_at, 1.0)?.is_none() {
-        return Ok(Compared::Alike);
-    }
-    repeats.drift = Some(of_moves.map_or_else(drift, Ok)?);
     while looked_at.len() < MOST
         && let Some(candidate) = repeats.search(&aside, &known, &looked_at, 1.0)?
     {
         // The torque of the contact moves the mean of the other periods.
         let mut aside_with_it = aside.clone();
-        aside_with_it[candidate.samples(&repeats)].fill(true);
+        aside_with_it[candidate.samples(repeats)].fill(true);
         let Some(push) = repeats.weigh(&candidate, &aside_with_it, &known)? else {
             match candidate.of_move {
                 Some(number) => drop(repeats.moves.remove(number)),
-                None => looked_at.push(candidate.samples(&repeats)),
+                None => looked_at.push(candidate.samples(repeats)),
             }
             continue;
         };
@@ -111,16 +157,17 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
         }
         aside = aside_with_it;
         let touch = repeats.touch(&candidate, &push, time_s[repeats.window.start]);
-        aside[touch.disturbed(rate_hz, time_s.len())].fill(true);
+        aside[touch.disturbed(repeats.rate_hz, time_s.len())].fill(true);
         looked_at.push(touch.samples.clone());
         known.push(push);
         touches.push(touch);
     }
-    if touches.is_empty() {
-        return Ok(Compared::Alike);
-    }
+    Ok((touches, aside))
+}
+
+/// The contacts, in the order of time, that these touches are: those closer than `together` samples are one.
+fn joined(mut touches: Vec<Touch>, together: usize) -> Vec<Touch> {
     touches.sort_by_key(|touch| touch.samples.start);
-    let together = (TOGETHER_S * rate_hz) as usize;
     let mut contacts: Vec<Touch> = Vec::new();
     for touch in touches {
         let is_near = |last: &&mut Touch| are_near(&last.samples, &touch.samples, together);
@@ -129,19 +176,28 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
             None => contacts.push(touch),
         }
     }
-    let is_touch = |touch: &&Touch| touch.samples.end > begin && touch.samples.start < stop;
-    let causes = contacts.iter().filter(is_touch).map(Touch::cause).collect();
+    contacts
+}
+
+/// The torque of the log `m`, Nm, with the trimmed mean of the other periods in place of the samples set `aside`.
+/// `time_s` are the time stamps of the evenly spaced clock.
+fn torque_without(
+    m: &Measurement,
+    time_s: &[f64],
+    repeats: &Repeats,
+    aside: &[bool],
+) -> JointSignals {
     let mut torque_nm = m.torque_nm.clone();
     for j in 0..torque_nm.joints() {
         let of_joint = repeats.signals.joint(j);
         for (value, &t) in torque_nm.joint_mut(j).iter_mut().zip(m.time_s) {
             let k = time_s.partition_point(|g| *g < t).min(time_s.len() - 1);
             if aside[k] && repeats.window.contains(&k) {
-                *value -= repeats.deviation(of_joint, k, &aside);
+                *value -= repeats.deviation(of_joint, k, aside);
             }
         }
     }
-    Ok(Compared::Touched(WithoutContacts { causes, torque_nm }))
+    torque_nm
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ mod loudness;
 mod moves;
 mod rarity;
 mod repeats;
+mod scoring;
 
 use std::ops::Range;
 

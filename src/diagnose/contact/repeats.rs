@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::bump::{self, FELT_SHARE, Felt, Noise, ORDINARY, Push};
+use super::bump::{self, Felt, Noise, ORDINARY, Push};
 use super::loudness::Loudness;
 use super::moves::Move;
 use super::rarity;
+use super::scoring::{Bumps, Scoring};
 use super::{Touch, are_near};
 use crate::diagnose::chance;
 use crate::diagnose::friction_drift::FrictionDrift;
@@ -17,9 +18,6 @@ use crate::median::{robust_sigma, trimmed_mean};
 use crate::robot::JointSignals;
 use crate::signal::{MatchedFilter, SignalError, other_periods};
 
-/// A joint felt a contact that is found on another joint alone if it deviates by this many σ (once in 10⁴ by chance),
-/// and by [`FELT_SHARE`] of the σ of the joint that felt it most.
-const FELT_BESIDE: f64 = 4.0;
 /// Length of the shortest bump, s; a collision lasts a tenth of a second.
 pub(super) const SHORTEST_S: f64 = 0.1;
 /// Length of the longest bump, s: a hand that leans on the arm.
@@ -146,86 +144,62 @@ impl Repeats {
         let deviations = self.deviations(aside, known);
         let filter = MatchedFilter::new(&deviations, self.rate_hz)?;
         let loudness = Loudness::of(&deviations, self.rate_hz);
-        let rows: Vec<usize> = (0..self.joints.len()).collect();
-        if rows.is_empty() {
+        if self.joints.is_empty() {
             return Ok(None);
         }
-        let apart = (APART_S * self.rate_hz) as usize;
+        let lengths = self.lengths_s().into_par_iter().with_max_len(1);
+        let of_lengths: Vec<Bumps> = lengths.map(|length_s| Bumps::of(&filter, length_s)).collect();
         let mut highest = least;
         let mut best = None;
-        let of_length = |length_s: f64| {
-            let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
-            let noise = Noise::of(&heights);
-            (length_s, heights, noise)
-        };
-        let lengths = self.lengths_s().into_par_iter().with_max_len(1);
-        let of_lengths: Vec<_> = lengths.map(of_length).collect();
-        for (length_s, heights, noise) in of_lengths {
-            let others = |j: usize| [&rows[..j], &rows[j + 1..]].concat();
-            let alone_felt: Vec<Felt> =
-                rows.iter().map(|j| noise.felt_by(&[*j], &others(*j))).collect();
-            let reach = (0.5 * length_s * self.rate_hz) as usize;
-            let places = self.looked_through(length_s);
+        for bumps in of_lengths {
+            let alone = bumps.alone();
+            let places = self.looked_through(bumps.length_s);
             let far_anywhere = places[0].far;
-            for Place { centres, rows: telling, far, of_move } in places {
-                let together = noise.felt_by(&telling, &[]);
-                let far_together = rarity::as_far_in(telling.len(), far);
-                for centre in centres.start.max(reach)..centres.end.min(self.window.len() - reach) {
-                    let at = self.window.start + centre;
-                    let samples = at.saturating_sub(reach)..at + reach;
-                    if looked_at.iter().any(|other| are_near(other, &samples, apart)) {
-                        continue;
-                    }
-                    let scores = noise.scores(&heights, centre);
-                    // A bump that is below the bound in all joints together is below it in each.
-                    if noise.gain(&scores) <= (highest * far).powi(2) {
-                        continue;
-                    }
-                    let as_known = |felt: &Felt| felt.of_known_noise(felt.gain(&scores)).sqrt();
-                    let alone: Vec<f64> = alone_felt.iter().map(as_known).collect();
-                    let of_one = telling.iter().map(|j| alone[*j]).fold(0.0, f64::max) / far;
-                    let of_all = match telling.len() {
-                        1 => 0.0,
-                        _ => as_known(&together) / far_together,
-                    };
-                    // Louder noise makes higher bumps. The loudness decides whether a bump is noise, but not which of
-                    // the significant bumps is highest.
-                    let louder =
-                        |row: &usize| loudness.over(*row, centre - reach..centre + reach).powi(2);
-                    let beside = |felt: &Felt, louder: f64| {
-                        felt.of_known_noise(felt.gain(&scores) / louder).sqrt()
-                    };
-                    let stands_out = || {
-                        telling.iter().any(|j| beside(&alone_felt[*j], louder(j)) > least * far)
-                            || telling.len() > 1 && {
-                                let loudest = telling.iter().map(louder).fold(1.0, f64::max);
-                                beside(&together, loudest) > least * far_together
-                            }
-                    };
-                    if of_one.max(of_all) > highest && stands_out() {
-                        highest = of_one.max(of_all);
-                        let [mut felt, mut quiet] = felt_and_quiet(&scores, &alone, &telling);
-                        if of_all > of_one {
-                            // A joint that shows little of a push that all joints show together is not quiet.
-                            felt.extend(&telling);
-                            felt.sort_unstable();
-                            felt.dedup();
-                            quiet.clear();
-                        }
-                        best = Some(Candidate {
-                            centre,
-                            length_s,
-                            felt,
-                            quiet,
-                            far,
-                            far_anywhere,
-                            of_move,
-                        });
-                    }
+            for place in places {
+                let scoring = Scoring {
+                    bumps: &bumps,
+                    alone: &alone,
+                    telling: &place.rows,
+                    together: bumps.together(&place.rows),
+                    far: place.far,
+                    far_together: rarity::as_far_in(place.rows.len(), place.far),
+                    loudness: &loudness,
+                    least,
+                };
+                for centre in self.centres(&place, bumps.reach, looked_at) {
+                    let Some(found) = scoring.above(highest, centre) else { continue };
+                    highest = found.height;
+                    best = Some(Candidate {
+                        centre,
+                        length_s: bumps.length_s,
+                        felt: found.felt,
+                        quiet: found.quiet,
+                        far: place.far,
+                        far_anywhere,
+                        of_move: place.of_move,
+                    });
                 }
             }
         }
         Ok(best)
+    }
+
+    /// Samples of the window, in `place`, that may be the middle of a bump with `reach` samples on either side, apart
+    /// from the samples `looked_at`.
+    fn centres(
+        &self,
+        place: &Place,
+        reach: usize,
+        looked_at: &[Range<usize>],
+    ) -> impl Iterator<Item = usize> {
+        let apart = (APART_S * self.rate_hz) as usize;
+        let is_apart = move |centre: &usize| {
+            let at = self.window.start + centre;
+            let samples = at.saturating_sub(reach)..at + reach;
+            !looked_at.iter().any(|other| are_near(other, &samples, apart))
+        };
+        let Range { start, end } = place.centres;
+        (start.max(reach)..end.min(self.window.len() - reach)).filter(is_apart)
     }
 
     /// Places and joints where bumps of `length_s` are searched for: first the whole log on all joints, then where the
@@ -383,19 +357,4 @@ fn level_wild_values(y: &mut [f64], reach: usize) {
             y[k + 1 - reach..k + reach].fill(level(k));
         }
     }
-}
-
-/// Which joints felt a bump with these scores, and which show noise alone. `alone` holds the significance of each joint
-/// with the others taken as quiet; among those `telling`, the joint with the largest felt it in any case.
-fn felt_and_quiet(scores: &[f64], alone: &[f64], telling: &[usize]) -> [Vec<usize>; 2] {
-    let limit = FELT_BESIDE.max(FELT_SHARE * farthest(scores));
-    let most = telling.iter().max_by(|a, b| alone[**a].total_cmp(&alone[**b]));
-    let is_felt = |j: &usize| scores[*j].abs() >= limit || Some(j) == most;
-    let is_quiet = |j: &usize| scores[*j].abs() < FELT_BESIDE && !is_felt(j);
-    let joints = 0..scores.len();
-    [joints.clone().filter(is_felt).collect(), joints.filter(is_quiet).collect()]
-}
-
-fn farthest(scores: &[f64]) -> f64 {
-    scores.iter().fold(0.0, |a, z| a.max(z.abs()))
 }

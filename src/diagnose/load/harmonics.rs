@@ -1,16 +1,17 @@
 //! Harmonics of a torque, and which of them stand out of their noise.
 
 use fourier::Complex64;
+use rayon::prelude::*;
 
+use crate::diagnose::mean_spectrum::{BAND, Band, MeanSpectrum};
 use crate::diagnose::reversal_answer::TorqueHarmonic;
+use crate::robot::JointSignals;
 use crate::signal::FineClock;
 
 /// A band of harmonics whose power is more than this many times its noise is used as it is.
 pub(super) const WELL_KNOWN: f64 = 100.0;
 /// The same for [`Loads::bending`](super::Loads::bending).
 pub(super) const KNOWN: f64 = 10.0;
-/// Number of harmonics that are judged together.
-const BAND: usize = 8;
 
 /// The harmonics of a torque and how well they are known.
 pub(super) struct Harmonics {
@@ -25,29 +26,23 @@ pub(super) struct Harmonics {
 impl Harmonics {
     /// The harmonics of `periods`, which follow one after another.
     pub(super) fn of(clock: &FineClock, periods: &[f64]) -> Self {
-        let spectra: Vec<Vec<Complex64>> =
-            periods.chunks_exact(clock.samples()).map(|y| clock.spectrum(y)).collect();
-        let count = spectra.len() as f64;
-        let harmonics = clock.samples() / 2 + 1;
-        let mean: Vec<Complex64> = (0..harmonics)
-            .map(|h| spectra.iter().map(|s| s[h]).sum::<Complex64>() / count)
-            .collect();
-        let (mut known, mut noise) = (Vec::new(), Vec::with_capacity(harmonics));
-        for first in (0..harmonics).step_by(BAND) {
-            let band = first..(first + BAND).min(harmonics);
-            let (mut power, mut scatter) = (0.0, 0.0);
-            for h in band.clone() {
-                power += mean[h].norm_sqr();
-                scatter += spectra.iter().map(|s| (s[h] - mean[h]).norm_sqr()).sum::<f64>();
-            }
-            let of_mean = scatter / (count * (count - 1.0));
-            known.push(if power > 0.0 { power / of_mean - 1.0 } else { 0.0 });
-            noise.resize(band.end, of_mean / band.len() as f64);
+        let spectrum = MeanSpectrum::of(clock, periods);
+        let (mut known, mut noise) = (Vec::new(), Vec::new());
+        for Band { harmonics, power, noise: of_band } in spectrum.bands(0) {
+            known.push(if power > 0.0 { power / of_band - 1.0 } else { 0.0 });
+            noise.resize(harmonics.end, of_band / harmonics.len() as f64);
         }
+        let mean = spectrum.mean;
         // Without noise all harmonics are known equally well, to within their rounding.
         let rounding = f64::EPSILON * mean.iter().map(Complex64::norm_sqr).fold(0.0, f64::max);
         noise.iter_mut().for_each(|noise| *noise = noise.max(rounding));
         Self { known: Known(known), mean, noise }
+    }
+
+    /// The harmonics of the periods in `signals`, by joint.
+    pub(super) fn of_joints(clock: &FineClock, signals: &JointSignals) -> Vec<Self> {
+        let of_joint = |j: usize| Self::of(clock, signals.joint(j));
+        (0..signals.joints()).into_par_iter().map(of_joint).collect()
     }
 
     /// The harmonics up to `last` in which a `load` is not known to `level`.
@@ -63,6 +58,11 @@ impl Harmonics {
 pub(super) struct Known(Vec<f64>);
 
 impl Known {
+    /// How well the harmonics of the periods in `signals` are known, by joint.
+    pub(super) fn of_joints(clock: &FineClock, signals: &JointSignals) -> Vec<Self> {
+        Harmonics::of_joints(clock, signals).into_iter().map(|of| of.known).collect()
+    }
+
     /// The same with nothing known in bands beyond that of the harmonic `last`.
     pub(super) fn up_to(&self, last: usize) -> Self {
         let bands = last / BAND + 1;

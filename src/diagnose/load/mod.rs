@@ -2,27 +2,27 @@
 //!
 //! The noise of the acceleration is in the residual of the null model as well as in the columns that a family derives
 //! from the load. Where a column differentiates the load, the two would be correlated for no physical reason. If the
-//! motion repeats, the slow harmonics of the load are known well and used as they are ([`Harmonics`]). Each fast
-//! harmonic is small and drowns in noise, yet these harmonics make gears swing. They are not accidental: a drive that
-//! does not answer dry friction at once jolts its joint, in the same way at every reversal. This common course is known
-//! ([`jolts`]), and the torque shows it better than the motion.
+//! motion repeats, the slow harmonics of the load are known well and used as they are ([`Known`]). Each fast harmonic
+//! is small and drowns in noise, yet these harmonics make gears swing. They are not accidental: a drive that does not
+//! answer dry friction at once jolts its joint, in the same way at every reversal. This common course is known
+//! ([`DriveTorques`]), and the torque shows it better than the motion.
 //!
 //! Enters: the motion of a log, the arm, and the periods if the motion repeats. Leaves: [`Loads`].
 
+mod drive_torques;
 mod harmonics;
 mod rigid;
 
-pub use rigid::{load_along, mass_along, rigid_torque_along, rotors_kg_m2};
+pub use rigid::{RigidArm, load_along, rigid_torque_along};
 
-use fourier::Complex64;
 use nalgebra::{Cholesky, DMatrix, DVector};
-use rayon::prelude::*;
 
-use super::reversal_answer::{FASTEST_HZ, ReversalAnswer};
+use super::reversal_answer::ReversalAnswer;
 use crate::dynamics::{Model, Motion};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{FineClock, mean_period};
-use harmonics::{Harmonics, KNOWN, Known, WELL_KNOWN, beside_differentiated_noise};
+use drive_torques::DriveTorques;
+use harmonics::{KNOWN, Known, WELL_KNOWN, beside_differentiated_noise};
 use rigid::rotors_along;
 
 /// Torques of a rigid arm along the motion of a log, as far as the log determines them.
@@ -83,9 +83,8 @@ pub struct Periods<'a> {
 }
 
 impl Loads {
-    /// Loads along a single run as it was recorded at `rate_hz`, where the links need `link_nm`. `mass_kg_m2` comes
-    /// from [`mass_along`], `rotor_kg_m2` from [`rotors_kg_m2`]. The noise of the velocities has the power density
-    /// `velocity_noise`, (rad/s)²/Hz.
+    /// Loads of `rigid_arm` along a single run as it was recorded at `rate_hz`. The noise of the velocities has the
+    /// power density `velocity_noise`, (rad/s)²/Hz.
     ///
     /// Without repetitions harmonics cannot be compared between periods: `link` and `load_nm` are used whole. The
     /// torque that bends gears is used where its power is ten times that of the velocity's noise, differentiated and
@@ -94,9 +93,10 @@ impl Loads {
     pub fn as_recorded(
         arm: &Arm,
         motion: &Motion,
-        (link_nm, mass_kg_m2, rotor_kg_m2): (&JointSignals, &[JointSignals], &[f64]),
+        rigid_arm: &RigidArm,
         (velocity_noise, rate_hz): (&[f64], f64),
     ) -> Self {
+        let RigidArm { link_nm, mass_kg_m2, rotor_kg_m2 } = rigid_arm;
         let still = || link_nm.map_joints(|_, y| vec![0.0; y.len()]);
         let ([], mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, []);
         let load_nm = sum(link_nm, &rotors_along(arm, motion));
@@ -114,95 +114,53 @@ impl Loads {
         Self { link, bending, rigid, delivered: None, load_nm, mobility_per_kg_m2 }
     }
 
-    /// Loads along the mean of `periods`, as far as the periods agree. `link_nm` belongs to the motion of the
+    /// Loads along the mean of `periods`, as far as the periods agree. `rigid_arm` belongs to the motion of the
     /// regressor, whose accelerations end at the harmonic from which on their noise costs more than they tell. The
     /// torques that make gears swing use the accelerations of the periods themselves, with all their harmonics.
     pub fn agreed(
         (model, arm): (&Model, &Arm),
         mean: &Motion,
-        (link_nm, mass_kg_m2, rotor_kg_m2): (&JointSignals, &[JointSignals], &[f64]),
+        rigid_arm: &RigidArm,
         periods: &Periods,
     ) -> Self {
-        let Periods { each, torque_nm, clock, rate_hz, highest } = *periods;
-        let harmonics = |y: &JointSignals| -> Vec<Harmonics> {
-            (0..y.joints()).into_par_iter().map(|j| Harmonics::of(clock, y.joint(j))).collect()
-        };
-        let known = |y: &JointSignals| -> Vec<Known> {
-            harmonics(y).into_iter().map(|of| of.known).collect()
-        };
+        let Periods { each, clock, rate_hz, highest, .. } = *periods;
+        let (links, rotors) = (rigid_torque_along(model, each), rotors_along(arm, each));
+        let loads = sum(&links, &rotors);
+        let [of_loads, of_links, of_rotors] =
+            [&loads, &links, &rotors].map(|y| Known::of_joints(clock, y));
+        let last = (RIGID_HZ * clock.samples() as f64 / rate_hz) as usize;
+        let [of_slow_loads, of_slow_links] = [&of_loads, &of_links]
+            .map(|of| of.iter().map(|of| of.up_to(last)).collect::<Vec<Known>>());
+        let drives = DriveTorques::along(arm, mean, periods);
+        let answers = drives.answers(&of_loads, KNOWN);
+        let beyond_nm = drives.given_nm(&answers);
+        let [well_beyond_nm, slow_beyond_nm] = [&of_loads, &of_slow_loads]
+            .map(|of_loads| drives.given_nm(&drives.answers(of_loads, WELL_KNOWN)));
+        let jolts_nm = [
+            &drives.jolts_nm(&of_links, &well_beyond_nm, WELL_KNOWN),
+            &drives.jolts_nm(&of_links, &beyond_nm, KNOWN),
+            &drives.jolts_nm(&of_slow_links, &slow_beyond_nm, WELL_KNOWN),
+        ];
+        let RigidArm { link_nm, mass_kg_m2, rotor_kg_m2 } = rigid_arm;
+        let (of_jolts, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, jolts_nm);
+        let [well_beyond, beyond, slow_beyond] = of_jolts;
         let part = |of: &[Known], y: &JointSignals, level: f64| {
             y.map_joints(|j, y| of[j].part(clock, y, level))
         };
-        let (links, rotors) = (rigid_torque_along(model, each), rotors_along(arm, each));
-        let loads = sum(&links, &rotors);
-        let (of_loads, of_links) = (known(&loads), known(&links));
-        let slow = |of: &[Known]| -> Vec<Known> {
-            let last = (RIGID_HZ * clock.samples() as f64 / rate_hz) as usize;
-            of.iter().map(|of| of.up_to(last)).collect()
-        };
-        let (of_slow_loads, of_slow_links) = (slow(&of_loads), slow(&of_links));
-        let of_torques = harmonics(torque_nm);
-        let fine_sign: Vec<Vec<f64>> = (0..mean.joints())
-            .map(|j| {
-                let sign = |qd: f64| arm.friction_sign(qd);
-                clock.refined(mean.qd_rad_s.joint(j)).into_iter().map(sign).collect()
-            })
-            .collect();
-        let coulomb_nm = |j: usize| arm.joints[j].drive.coulomb_nm;
-        let dry = |j: usize| fine_sign[j].iter().map(move |s| coulomb_nm(j) * s);
-        // Fitted to the harmonics in which the load is not known to `level`.
-        let answers = |of_loads: &[Known], level: f64| -> Vec<ReversalAnswer> {
-            let of_joint = |j: usize| {
-                let torque = of_torques[j].beyond(&of_loads[j], level, fastest(periods));
-                let sign = fine_sign[j].clone();
-                ReversalAnswer::new((clock, rate_hz), sign, coulomb_nm(j), torque)
-            };
-            (0..mean.joints()).into_par_iter().map(of_joint).collect()
-        };
-        let given = |answers: &[ReversalAnswer]| -> Vec<Vec<f64>> {
-            answers.iter().map(|answer| answer.given_nm(clock, 0.0)).collect()
-        };
-        let well_beyond_nm = given(&answers(&of_loads, WELL_KNOWN));
-        let slow_beyond_nm = given(&answers(&of_slow_loads, WELL_KNOWN));
-        let answers = answers(&of_loads, KNOWN);
-        let beyond_nm = given(&answers);
-        let jolts = |of_links: &[Known], delivered_nm: &[Vec<f64>], level: f64| {
-            let of_joint = |j: usize| -> Vec<f64> {
-                let beside: Vec<f64> =
-                    delivered_nm[j].iter().zip(dry(j)).map(|(given, dry)| given - dry).collect();
-                jolts(periods, &of_links[j], level, &beside)
-            };
-            let joints: Vec<Vec<f64>> = (0..mean.joints()).into_par_iter().map(of_joint).collect();
-            JointSignals::from_fn(mean.joints(), mean.samples(), |j, k| joints[j][k])
-        };
-        let jolts_nm = [
-            &jolts(&of_links, &well_beyond_nm, WELL_KNOWN),
-            &jolts(&of_links, &beyond_nm, KNOWN),
-            &jolts(&of_slow_links, &slow_beyond_nm, WELL_KNOWN),
-        ];
-        let (of_jolts, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, jolts_nm);
-        let [well_beyond, beyond, slow_beyond] = of_jolts;
-        let rest = |of_links: &[Known], y: JointSignals, level: f64| {
-            y.map_joints(|j, y| of_links[j].rest(clock, y, level, highest))
-        };
-        let link = LinkTorque {
-            told_nm: part(&of_links, link_nm, WELL_KNOWN),
-            jolt_nm: rest(&of_links, well_beyond, WELL_KNOWN),
-        };
-        let rigid = LinkTorque {
-            told_nm: part(&of_slow_links, link_nm, WELL_KNOWN),
-            jolt_nm: rest(&of_slow_links, slow_beyond, WELL_KNOWN),
+        let link_torque = |of_links: &[Known], told: &JointSignals, jolts: &JointSignals, level| {
+            let rest = |j: usize, y: &[f64]| of_links[j].rest(clock, y, level, highest);
+            LinkTorque { told_nm: part(of_links, told, level), jolt_nm: jolts.map_joints(rest) }
         };
         let mean_of = |y: &JointSignals| y.map_joints(|_, y| mean_period(y, clock.samples()));
-        let bending = LinkTorque {
-            told_nm: part(&of_links, &mean_of(&links), KNOWN),
-            jolt_nm: rest(&of_links, beyond, KNOWN),
-        };
+        let link = link_torque(&of_links, link_nm, &well_beyond, WELL_KNOWN);
+        let rigid = link_torque(&of_slow_links, link_nm, &slow_beyond, WELL_KNOWN);
+        let bending = link_torque(&of_links, &mean_of(&links), &beyond, KNOWN);
         let is_known =
-            of_loads.iter().map(|of| (0..=highest).map(|h| of.holds(h, KNOWN)).collect()).collect();
+            |of: &Known| -> Vec<bool> { (0..=highest).map(|h| of.holds(h, KNOWN)).collect() };
+        let known = of_loads.iter().map(is_known).collect();
         let load_nm = part(&of_loads, &mean_of(&loads), KNOWN);
-        let delivered = Some(Delivered { load_nm, known: is_known, beyond_nm, answers });
-        let rotor_nm = part(&known(&rotors), &rotors_along(arm, mean), WELL_KNOWN);
+        let delivered = Some(Delivered { load_nm, known, beyond_nm, answers });
+        let rotor_nm = part(&of_rotors, &rotors_along(arm, mean), WELL_KNOWN);
         let load_nm = sum(&link.told_nm, &rotor_nm);
         Self { load_nm, link, bending, rigid, delivered, mobility_per_kg_m2 }
     }
@@ -254,23 +212,6 @@ fn apart<const N: usize>(
 /// motion, recorded without noise, as long as all harmonics counted, and 82 % with these.
 const RIGID_HZ: f64 = 7.0;
 
-/// The last harmonic in which the drives' answers are fitted.
-fn fastest(periods: &Periods) -> usize {
-    let Periods { clock, rate_hz, highest, .. } = *periods;
-    highest.min((FASTEST_HZ * clock.samples() as f64 / rate_hz) as usize)
-}
-
-/// The part of a drive's torque beyond friction in the harmonics in which the torque of its links is not known to
-/// `level`, at the samples, Nm. `beside_friction_nm` is the torque at every tick.
-fn jolts(periods: &Periods, links: &Known, level: f64, beside_friction_nm: &[f64]) -> Vec<f64> {
-    let last = fastest(periods);
-    let every_tick = FineClock::new(beside_friction_nm.len(), 1);
-    let fast = every_tick.filtered(beside_friction_nm, |h| {
-        if h <= last && !links.holds(h, level) { Complex64::ONE } else { Complex64::ZERO }
-    });
-    fast.into_iter().step_by(periods.clock.ticks()).collect()
-}
-
 fn sum(a: &JointSignals, b: &JointSignals) -> JointSignals {
     a.map_joints(|j, a| a.iter().zip(b.joint(j)).map(|(a, b)| a + b).collect())
 }
@@ -278,10 +219,6 @@ fn sum(a: &JointSignals, b: &JointSignals) -> JointSignals {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const N: usize = 500;
-    const TICKS: usize = 16;
-    const RATE_HZ: f64 = 125.0;
 
     fn ur5() -> (Arm, Model) {
         let arm = Arm::built_in("ur5").unwrap();
@@ -307,13 +244,13 @@ mod tests {
         let motion = one_sample();
         let at_rest =
             Motion { qdd_rad_s2: motion.qdd_rad_s2.map_joints(|_, _| vec![0.0]), ..motion.clone() };
-        let gravity_nm = rigid_torque_along(&model, &at_rest);
-        let mass = mass_along(&model, &at_rest, &gravity_nm);
+        let still = RigidArm::along(&model, &arm, &at_rest);
+        let (gravity_nm, mass) = (still.link_nm, still.mass_kg_m2);
         let less_gravity =
             |y: JointSignals| y.map_joints(|j, y| vec![y[0] - gravity_nm.joint(j)[0]]);
         let on_gears = less_gravity(load_along(&model, &arm, &motion));
         let on_links = less_gravity(rigid_torque_along(&model, &motion));
-        let ([links], mobility) = apart(&mass, &rotors_kg_m2(&arm, &mass), [&on_gears]);
+        let ([links], mobility) = apart(&mass, &still.rotor_kg_m2, [&on_gears]);
         for j in 0..6 {
             // Torques of some 10 Nm, through inertias whose ratio is up to 100 : 1.
             assert!((links.joint(j)[0] - on_links.joint(j)[0]).abs() < 1e-11);
@@ -325,61 +262,5 @@ mod tests {
             // The links of the last joint are light: their share beside the rotor is 5e-4, which costs as many digits.
             assert!((mobility.joint(j)[0] / apart - 1.0).abs() < 1e-9, "{j}");
         }
-    }
-
-    /// A drive that feeds 90 % of the friction forward, 3 ms late: the jolts of its joint are found as they should be,
-    /// up to the noise of six coefficients and the inability of steps of 8 ms to follow a delay of 3 ms.
-    #[test]
-    fn reversals_tell_the_jolts_of_a_drive() {
-        let (fine, coulomb_nm, late) = (N * TICKS, 8.0, 6);
-        let velocity = |k: usize| {
-            let phase = std::f64::consts::TAU * k as f64 / fine as f64;
-            (3.0 * phase + 0.4).sin() + 0.6 * (5.0 * phase + 1.0).cos() + 0.3 * (8.0 * phase).sin()
-        };
-        let sign: Vec<f64> = (0..fine).map(|k| (velocity(k) / 0.02).tanh()).collect();
-        let fed = |k: usize| 0.9 * coulomb_nm * sign[(k + fine - late) % fine];
-        let mut state = 1_u64;
-        let mut noise = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
-        };
-        let torque: Vec<f64> = (0..8 * N)
-            .map(|k| fed(k % N * TICKS) + 20.0 * velocity(k % N * TICKS) + noise())
-            .collect();
-        let load: Vec<f64> =
-            (0..8 * N).map(|k| 20.0 * velocity(k % N * TICKS) + 4.0 * noise()).collect();
-        let clock = FineClock::new(N, TICKS);
-        let still = Motion {
-            q_rad: JointSignals::zeros(1, N),
-            qd_rad_s: JointSignals::zeros(1, N),
-            qdd_rad_s2: JointSignals::zeros(1, N),
-        };
-        let periods = Periods {
-            each: &still,
-            torque_nm: &JointSignals::zeros(1, N),
-            clock: &clock,
-            rate_hz: RATE_HZ,
-            highest: 200,
-        };
-        let of_load = Harmonics::of(&clock, &load).known;
-        assert!(of_load.holds(8, WELL_KNOWN) && !of_load.holds(50, WELL_KNOWN));
-        let of_torque = Harmonics::of(&clock, &torque);
-        let torque = of_torque.beyond(&of_load, WELL_KNOWN, fastest(&periods));
-        let answer = ReversalAnswer::new((&clock, RATE_HZ), sign.clone(), coulomb_nm, torque);
-        let given = answer.given_nm(&clock, 0.0);
-        let beside: Vec<f64> =
-            given.iter().zip(&sign).map(|(given, s)| given - coulomb_nm * s).collect();
-        let known = jolts(&periods, &of_load, WELL_KNOWN, &beside);
-        let true_nm: Vec<f64> = (0..fine).map(|k| fed(k) - coulomb_nm * sign[k]).collect();
-        let band = FineClock::new(fine, 1).filtered(&true_nm, |h| {
-            if h <= 200 && !of_load.holds(h, WELL_KNOWN) { Complex64::ONE } else { Complex64::ZERO }
-        });
-        let truth: Vec<f64> = band.into_iter().step_by(TICKS).collect();
-        let square = |y: &[f64]| y.iter().map(|y| y * y).sum::<f64>();
-        let off: Vec<f64> = truth.iter().zip(&known).map(|(t, k)| t - k).collect();
-        // Six coefficients of unit noise, relative to what they explain, and the error of the steps, which is 0.03
-        // without noise.
-        let share = square(&off) / square(&truth);
-        assert!(share < 0.1, "{share}");
     }
 }

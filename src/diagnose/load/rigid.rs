@@ -6,6 +6,26 @@ use crate::dynamics::{
 };
 use crate::robot::{Arm, JointSignals};
 
+/// A rigid arm along a motion: the torque and the inertias of its links, and those of its rotors.
+pub struct RigidArm {
+    /// Torque that moves the links, M_links q̈ + c + g, Nm.
+    pub link_nm: JointSignals,
+    /// Mass matrix M of the links, kg m², column by column.
+    pub mass_kg_m2: Vec<JointSignals>,
+    /// Inertia I_a of every rotor, kg m², no less than a small share of the inertia of its links.
+    pub rotor_kg_m2: Vec<f64>,
+}
+
+impl RigidArm {
+    /// The `arm`, whose `model` is given, along `motion`.
+    pub fn along(model: &Model, arm: &Arm, motion: &Motion) -> Self {
+        let link_nm = rigid_torque_along(model, motion);
+        let mass_kg_m2 = mass_along(model, motion, &link_nm);
+        let rotor_kg_m2 = rotors_kg_m2(arm, &mass_kg_m2);
+        Self { link_nm, mass_kg_m2, rotor_kg_m2 }
+    }
+}
+
 /// Torque on the gear of every sample, Nm: M q̈ + c + g of links and rotors, without friction.
 pub fn load_along(model: &Model, arm: &Arm, motion: &Motion) -> JointSignals {
     sum(&rigid_torque_along(model, motion), &rotors_along(arm, motion))
@@ -44,16 +64,15 @@ fn fill_rigid_torque(model: &Model, motion: &Motion, out: &mut JointSignals) {
     }
 }
 
-/// M at every sample, kg m², column by column: the additional torque on all joints, over `recorded_nm`, when one joint
+/// M at every sample, kg m², column by column: the additional torque on all joints, over `link_nm`, when one joint
 /// accelerates by one rad/s² more.
-pub fn mass_along(model: &Model, motion: &Motion, recorded_nm: &JointSignals) -> Vec<JointSignals> {
+fn mass_along(model: &Model, motion: &Motion, link_nm: &JointSignals) -> Vec<JointSignals> {
     (0..motion.joints())
         .map(|j| {
             let mut faster = motion.clone();
             faster.qdd_rad_s2.joint_mut(j).iter_mut().for_each(|qdd| *qdd += 1.0);
             let torque = rigid_torque_along(model, &faster);
-            torque
-                .map_joints(|i, t| t.iter().zip(recorded_nm.joint(i)).map(|(t, r)| t - r).collect())
+            torque.map_joints(|i, t| t.iter().zip(link_nm.joint(i)).map(|(t, r)| t - r).collect())
         })
         .collect()
 }
@@ -64,7 +83,7 @@ const LIGHTEST_ROTOR: f64 = 0.02;
 
 /// I_a of every joint, kg m², at least the share `LIGHTEST_ROTOR` of the mean inertia of the links; `mass_kg_m2` comes
 /// from [`mass_along`].
-pub fn rotors_kg_m2(arm: &Arm, mass_kg_m2: &[JointSignals]) -> Vec<f64> {
+fn rotors_kg_m2(arm: &Arm, mass_kg_m2: &[JointSignals]) -> Vec<f64> {
     let rotor = |(j, mass): (usize, &JointSignals)| {
         let own = mass.joint(j);
         let lightest = LIGHTEST_ROTOR * own.iter().sum::<f64>() / own.len() as f64;

@@ -50,6 +50,15 @@ impl Layout {
         Self { base, body, friction, friction_base, count: friction + 3 * joints }
     }
 
+    /// Adds the columns of a body whose parameters are these `terms` of base parameters.
+    pub(super) fn add_body(&self, e: &mut Equations, terms: &[Vec<f64>]) {
+        for (c, terms) in terms.iter().enumerate() {
+            let column = combination(&e.columns, terms);
+            e.columns.set_column(self.body + c, &column);
+        }
+    }
+
+    /// Adds the columns of the changes of friction.
     pub(super) fn add_friction_change(&self, e: &mut Equations) {
         for (c, base) in self.friction_base[e.joint].iter().enumerate() {
             if let Some(base) = base {
@@ -61,7 +70,7 @@ impl Layout {
 }
 
 /// Σ_k terms_k column_k of the base parameters' columns.
-pub(super) fn combination(columns: &DMatrix<f64>, terms: &[f64]) -> DVector<f64> {
+fn combination(columns: &DMatrix<f64>, terms: &[f64]) -> DVector<f64> {
     let mut sum = DVector::zeros(columns.nrows());
     for (k, term) in terms.iter().enumerate().filter(|(_, t)| **t != 0.0) {
         sum.axpy(*term, &columns.column(k), 1.0);

@@ -11,15 +11,14 @@
 
 mod body;
 mod equations;
+mod fit;
 mod words;
 
-use body::{BODY, Body, STATIC};
-use equations::{Layout, blocks, combination, equations, joint_gains};
+use fit::Fit;
 use serde::Serialize;
 
 use super::candidates::Candidate;
 use super::chance;
-use super::clustered::{Equations, Solution, solve};
 use super::error::DiagnoseError;
 use super::extension::Extension;
 use super::kind::Kind;
@@ -50,7 +49,9 @@ pub struct PayloadFinding {
     pub joint_gain_scales: Option<Vec<Estimate>>,
     /// Change of Coulomb friction per joint from the first log to the second, Nm.
     pub coulomb_change_nm: Vec<Estimate>,
-    /// Whether something touched the arm along the second log; the rows were taken out.
+    /// Whether the periods of the second log show that something touched the arm. The torque of the touch was then
+    /// replaced by the trimmed mean of the other periods. `false` if nothing was found or nothing looked for, as along
+    /// a single run.
     #[serde(skip)]
     pub was_touched: bool,
 }
@@ -65,9 +66,6 @@ pub(super) struct Shared<'a> {
     pub(super) extension: &'a Extension,
 }
 
-/// Rounds of the fit: some effects depend on the load on the gears, which is known better once the body is.
-const ROUNDS: usize = 2;
-
 /// Compares the log of the regression `second` with that of `first`; `names` are the names of the two logs.
 pub(super) fn between(
     shared: &Shared,
@@ -76,85 +74,22 @@ pub(super) fn between(
     names: [&str; 2],
     known_mass_kg: Option<f64>,
 ) -> Result<PayloadFinding, DiagnoseError> {
-    let set = shared.set;
-    let joints = shared.arm.dof();
-    let Body { terms, told } = Body::new(set, joints);
-    let mut loaded_theta = shared.extension.theta.clone();
-    let layout = Layout::new(set, shared.extension, joints);
-    let unloaded = equations(shared, &layout, first, &shared.extension.theta, 0)?;
-    let offset = blocks(&unloaded);
-    let elsewhere = shared.extension.elsewhere(shared.families);
-    let beside_body = Shared { extension: &elsewhere, ..*shared };
-    let mut fit: Option<(Vec<Equations>, Solution)> = None;
-    for _ in 0..ROUNDS {
-        let mut all = unloaded.clone();
-        let mut loaded = equations(&beside_body, &layout, second, &loaded_theta, offset)?;
-        for e in &mut loaded {
-            layout.add_friction_change(e);
-            for (c, terms) in terms.iter().enumerate() {
-                let column = combination(&e.columns, terms);
-                e.columns.set_column(layout.body + c, &column);
-            }
-        }
-        all.extend(loaded);
-        let solution = solve(&all, joints, names[1])?;
-        for (k, theta) in loaded_theta.iter_mut().enumerate() {
-            let change: f64 = (0..BODY).map(|c| terms[c][k] * solution.x[layout.body + c]).sum();
-            *theta = solution.x[k] + change;
-        }
-        fit = Some((all, solution));
-    }
-    let Some((all, solution)) = fit else {
-        return Err(DiagnoseError::Singular { log: names[1].to_owned(), unknowns: layout.count });
-    };
-    let x: Vec<f64> = (0..BODY).map(|c| solution.x[layout.body + c]).collect();
-    let mass = x[0];
-    let unit_vector = |at: usize| {
-        let mut g = [0.0; STATIC];
-        g[at] = 1.0;
-        g
-    };
-    let estimate =
-        |value: f64, g: &[f64], unit: &'static str| solution.estimate(value, layout.body, g, unit);
-    let if_told = |is_told: bool, known: Estimate| match is_told {
-        true => known,
-        false => Estimate { value: f64::NAN, ci95: [f64::NAN; 2], ..known },
-    };
-    let mass_kg = if_told(told[0], estimate(mass, &unit_vector(0), "kg"));
-    let first_moment_kg_m =
-        [1, 2, 3].map(|a| if_told(told[a], estimate(x[a], &unit_vector(a), "kg m")));
-    let com_m = [1, 2, 3].map(|a| {
-        let mut g = [0.0; STATIC];
-        g[a] = 1.0 / mass;
-        g[0] = -x[a] / (mass * mass);
-        if_told(told[0] && told[a], estimate(x[a] / mass, &g, "m"))
-    });
-    let unknowns: Vec<usize> = (0..STATIC).filter(|c| told[*c]).map(|c| layout.body + c).collect();
-    let probability = solution.probability(&unknowns);
+    let fit = Fit::of(shared, first, second, names[1])?;
+    let (mass_kg, probability) = (fit.mass_kg(), fit.probability());
     let is_named = probability < chance::PAYLOAD && mass_kg.ci95[0] > 0.0;
-    let gain_scale = known_mass_kg
-        .filter(|_| is_named)
-        .map(|known| estimate(known / mass, &[-known / (mass * mass), 0.0, 0.0, 0.0], ""));
-    let joint_gain_scales = match known_mass_kg.filter(|_| is_named) {
-        Some(known) => Some(joint_gains(&all, &layout, joints, &x, known, names[1])?),
-        None => None,
-    };
-    let coulomb_change_nm = (0..joints)
-        .map(|j| {
-            let at = layout.friction + 3 * j;
-            solution.estimate(solution.x[at], at, &[1.0], "Nm")
-        })
-        .collect();
+    let known_kg = known_mass_kg.filter(|_| is_named);
+    let joint_gain_scales =
+        known_kg.map(|known| fit.joint_gain_scales(known, names[1])).transpose()?;
     Ok(PayloadFinding {
         reference: names[0].to_owned(),
         mass_kg,
-        first_moment_kg_m,
-        com_m,
+        first_moment_kg_m: fit.first_moment_kg_m(),
+        com_m: fit.com_m(),
         probability,
         is_named,
-        gain_scale,
+        gain_scale: known_kg.map(|known| fit.gain_scale(known)),
         joint_gain_scales,
-        coulomb_change_nm,
+        coulomb_change_nm: fit.coulomb_change_nm(),
         was_touched: false,
     })
 }

@@ -12,6 +12,7 @@
 mod counterpart;
 mod course;
 mod error;
+mod fitted;
 mod simulated;
 
 use serde::Serialize;
@@ -26,6 +27,7 @@ use crate::robot::JointSignals;
 pub use counterpart::{Counterpart, Found};
 pub(super) use course::measured_nm;
 pub use error::ReplayError;
+pub use fitted::Fitted;
 pub use simulated::{ExtendedSimulation, NotReplayed, SimulatedArm};
 
 use course::Course;
@@ -52,7 +54,9 @@ pub struct Replay {
 pub struct ReplayedLog {
     /// Name of the log.
     pub log: String,
-    /// Noise of the compared torque (the mean over the periods), rms per joint, Nm; null for a single run.
+    /// Noise of the compared torque (the mean over the periods) by the scatter of the torque between periods, rms per
+    /// joint, Nm; null for a single run. It does not hold the noise of the encoders, whose readings the simulation
+    /// follows.
     pub noise_nm: Option<Vec<f64>>,
     /// Without the causes.
     pub before: Distance,
@@ -227,7 +231,7 @@ impl Replay {
                 j + 1
             );
             if let Some(noise) = &log.noise_nm {
-                text += &format!(" (noise floor {:.2})", noise[j]);
+                text += &format!(" (torque noise of the mean {:.2} Nm)", noise[j]);
             }
             if let Some(share) = log.removed_fraction {
                 text += &format!(

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::counterpart::{Counterpart, Found};
 use super::course::plant_config;
 use super::error::ReplayError;
+use super::fitted::Fitted;
 use crate::base::BaseSet;
 use crate::diagnose::candidates::Candidate;
 use crate::diagnose::{Finding, Kind};
@@ -85,15 +86,11 @@ impl ExtendedSimulation {
         let mut fitted = Vec::new();
         // Kind and joint of each of `effects`, and what returns to the parameters if the effect is dropped.
         let mut sources = Vec::new();
-        for effect in &finding.extension.effects {
-            let family = &families[effect.family];
-            let quantities =
-                family.quantities(&finding.scene, effect.site, effect.shape, &effect.coefficients);
-            let quantities: Vec<_> = quantities.iter().map(|q| (q.name, q.value)).collect();
-            let (kind, joint) = (family.kind(), effect.site.map(|j| j + 1));
+        for Fitted { effect, kind, joint, counterpart } in
+            Fitted::all(&finding.extension.effects, families, &finding.scene)
+        {
             fitted.push((kind, joint));
-            let variant = effect.shape.variant;
-            if out.take(Found { kind, joint, variant, quantities: &quantities }, nominal) {
+            if out.take((kind, joint), counterpart, nominal) {
                 sources.push((kind, joint, &effect.absorbed));
             } else {
                 theta.iter_mut().zip(&effect.absorbed).for_each(|(theta, more)| *theta += more);
@@ -116,23 +113,28 @@ impl ExtendedSimulation {
             if fitted.contains(&(kind, joint)) {
                 continue;
             }
-            let found = Found { kind, joint, variant: 0, quantities: &[] };
-            if !matches!(found.kind, Kind::Contact) && !kind.is_of_the_record() {
+            if !matches!(kind, Kind::Contact) && !kind.is_of_the_record() {
                 let reason = HELD.to_owned();
                 out.not_replayed.push(NotReplayed { kind, joint, reason });
                 continue;
             }
             let quantities: Vec<_> =
                 cause.parameters.iter().map(|(name, e)| (*name, e.value)).collect();
-            out.take(Found { quantities: &quantities, ..found }, nominal);
+            let (in_words, quantities) = (&cause.in_words, &quantities);
+            let found = Found { kind, joint, variant: 0, in_words, quantities };
+            out.take((kind, joint), found.counterpart(), nominal);
         }
         Ok(out)
     }
 
-    /// Adds a cause; returns whether it acts in the simulated arm.
-    fn take(&mut self, found: Found, nominal: &Arm) -> bool {
-        let Found { kind, joint, .. } = found;
-        let reason = match found.counterpart() {
+    /// Adds the cause of this kind and joint; returns whether it acts in the simulated arm.
+    fn take(
+        &mut self,
+        (kind, joint): (Kind, Option<usize>),
+        counterpart: Counterpart,
+        nominal: &Arm,
+    ) -> bool {
+        let reason = match counterpart {
             Counterpart::InTheModel(effect) => {
                 self.effects.push(effect);
                 return true;
@@ -146,6 +148,7 @@ impl ExtendedSimulation {
                     Err(refusal) => format!("{REPAIRED}; {}", in_words(&refusal)),
                 }
             }
+            Counterpart::None(reason) if kind.is_of_the_record() => format!("{REPAIRED}; {reason}"),
             Counterpart::None(reason) => reason.to_owned(),
         };
         self.not_replayed.push(NotReplayed { kind, joint, reason });

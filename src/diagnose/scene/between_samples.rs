@@ -42,6 +42,58 @@ pub struct Instants {
     pub sign: Vec<f64>,
 }
 
+/// What has been computed between the samples of a scene: each quantity when it is first asked for.
+pub(super) struct BetweenSamples {
+    /// See [`Scene::fine_link_nm`].
+    fine_link_nm: Vec<OnceLock<Vec<f64>>>,
+    /// See [`Scene::fine_jolt_nm`].
+    fine_jolt_nm: Vec<OnceLock<Vec<f64>>>,
+    /// See [`Scene::fine_bending_nm`].
+    fine_bending_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
+    /// See [`Scene::fine_rigid_nm`].
+    fine_rigid_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
+    /// See [`Scene::instants`].
+    instants: Vec<OnceLock<Instants>>,
+    /// See [`Scene::turned`].
+    turned: Vec<OnceLock<Instants>>,
+    /// See [`Scene::sign_if_fed`].
+    signs_if_fed: Vec<[OnceLock<Vec<f64>>; 2]>,
+    /// Correction of the Fourier series of the samples for bends between them.
+    bends: OnceLock<Bends>,
+    /// See [`Scene::turning`].
+    turnings: Vec<OnceLock<Turning>>,
+    /// See [`Scene::answers`].
+    answers: Vec<OnceLock<Vec<Vec<f64>>>>,
+}
+
+impl BetweenSamples {
+    /// Nothing yet of an arm with so many `joints`.
+    pub(super) fn of(joints: usize) -> Self {
+        Self {
+            fine_link_nm: cells(joints),
+            fine_jolt_nm: cells(joints),
+            fine_bending_nm: cells(joints),
+            fine_rigid_nm: cells(joints),
+            instants: cells(joints),
+            turned: cells(joints),
+            signs_if_fed: (0..joints).map(|_| Default::default()).collect(),
+            bends: OnceLock::new(),
+            turnings: cells(joints),
+            answers: cells(joints),
+        }
+    }
+
+    /// Forgets how joint `j` turns round: another law of its friction is known.
+    pub(super) fn forget_turned(&mut self, j: usize) {
+        self.turned[j] = OnceLock::new();
+    }
+}
+
+/// An empty cell for each of the `joints`.
+fn cells<T>(joints: usize) -> Vec<OnceLock<T>> {
+    (0..joints).map(|_| OnceLock::new()).collect()
+}
+
 impl Scene {
     /// Time between two of the `FINE` instants per sample, s.
     pub fn instant_s(&self) -> f64 {
@@ -50,24 +102,24 @@ impl Scene {
 
     /// Link torque of joint `j`, Nm, at `FINE` instants per sample, for effects between samples.
     pub fn fine_link_nm(&self, j: usize) -> &[f64] {
-        self.fine_link_nm[j].get_or_init(|| self.fine(self.link_nm.joint(j)))
+        self.between.fine_link_nm[j].get_or_init(|| self.fine(self.link_nm.joint(j)))
     }
 
     /// Torque that the links of joint `j` take where joints reverse, at `FINE` instants per sample, Nm.
     pub fn fine_jolt_nm(&self, j: usize) -> &[f64] {
-        self.fine_jolt_nm[j].get_or_init(|| self.fine(self.jolt_nm.joint(j)))
+        self.between.fine_jolt_nm[j].get_or_init(|| self.fine(self.jolt_nm.joint(j)))
     }
 
     /// Torques that make a compliant gear at joint `j` swing, at `FINE` instants per sample, Nm: the torque of its
     /// links that the motion determines, and what the links take in addition where joints reverse.
     pub fn fine_bending_nm(&self, j: usize) -> [&[f64]; 2] {
-        self.fine_parts_nm(&self.fine_bending_nm[j], &self.bending, j)
+        self.fine_parts_nm(&self.between.fine_bending_nm[j], &self.bending, j)
     }
 
     /// Torques that part the flanks of a gear with play at joint `j`, at `FINE` instants per sample, Nm: what moves its
     /// links as long as no gear has play, and what they take in addition where joints reverse.
     pub fn fine_rigid_nm(&self, j: usize) -> [&[f64]; 2] {
-        self.fine_parts_nm(&self.fine_rigid_nm[j], &self.rigid, j)
+        self.fine_parts_nm(&self.between.fine_rigid_nm[j], &self.rigid, j)
     }
 
     /// Both parts of the torque `of` at `FINE` instants per sample, kept in `cell`.
@@ -85,7 +137,7 @@ impl Scene {
     /// themselves in a single run, whose low-pass lies far below the sampling rate.
     pub fn instants(&self, j: usize) -> &Instants {
         let epsilon = self.arm.friction_epsilon_rad_s;
-        self.instants[j].get_or_init(|| self.instants_with(j, None, epsilon))
+        self.between.instants[j].get_or_init(|| self.instants_with(j, None, epsilon))
     }
 
     /// The same where the friction of joint `j` turns round as another law says.
@@ -93,7 +145,7 @@ impl Scene {
         match self.other_friction(j).turn {
             None => self.instants(j),
             Some(Turn { width_rad_s, fed }) => {
-                self.turned[j].get_or_init(|| self.instants_with(j, Some(fed), width_rad_s))
+                self.between.turned[j].get_or_init(|| self.instants_with(j, Some(fed), width_rad_s))
             }
         }
     }
@@ -147,13 +199,13 @@ impl Scene {
             }
             None => told.beyond_nm[j].iter().map(|nm| nm / self.coulomb_nm[j]).collect(),
         };
-        let bends = self.bends.get_or_init(|| Bends::new(clock));
+        let bends = self.between.bends.get_or_init(|| Bends::new(clock));
         bends.between_samples(joint, &delivered, width_rad_s, law)
     }
 
     /// tanh(q̇/ε) of joint `j` at its instants, for a drive that feeds `fed` times its dry friction forward, 0 or 1.
     pub fn sign_if_fed(&self, j: usize, fed: usize) -> &[f64] {
-        self.signs_if_fed[j][fed].get_or_init(|| {
+        self.between.signs_if_fed[j][fed].get_or_init(|| {
             let epsilon = self.arm.friction_epsilon_rad_s;
             let sign = |v: f64| self.arm.friction_sign(v);
             let qd_rad_s = self.turning_rad_s(j, Some(fed as f64), epsilon, sign);
@@ -169,7 +221,7 @@ impl Scene {
 
     /// Quantities that determine how the velocity of joint `j` bends where its friction turns round.
     fn turning(&self, j: usize) -> &Turning {
-        self.turnings[j].get_or_init(|| {
+        self.between.turnings[j].get_or_init(|| {
             let series_rad_s = self.fine(self.motion.qd_rad_s.joint(j));
             let expected = series_rad_s.iter().map(|v| self.arm.friction_sign(*v)).collect();
             let rotor = self.rotor_kg_m2[j];
@@ -258,7 +310,7 @@ impl Scene {
     /// single run.
     pub fn answers(&self, j: usize) -> &[Vec<f64>] {
         let Some(clock) = &self.clock else { return &[] };
-        self.answers[j].get_or_init(|| {
+        self.between.answers[j].get_or_init(|| {
             drive_answers(clock, &self.instants(j).sign, self.highest, self.rate_hz).into()
         })
     }

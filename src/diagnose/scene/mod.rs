@@ -9,21 +9,17 @@ mod other_friction;
 pub use between_samples::{FINE, Instants, LONGEST_LEAD_S};
 pub use other_friction::{OtherFriction, SHARPEST, Turn};
 
-use std::sync::OnceLock;
-
 use fourier::Complex64;
 
 use super::lateness::Lateness;
-use super::load::{
-    Delivered, LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2,
-};
+use super::load::{Delivered, LinkTorque, Loads, Periods, RigidArm, rigid_torque_along};
 use super::reversal_answer::shifted;
-use super::reversals::{Bends, Turning};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
 use crate::identify::Prepared;
-use crate::robot::{Arm, JointSignals};
+use crate::robot::{Arm, Joint, JointSignals};
 use crate::signal::{FineClock, central_4, linear_at, mean_period};
+use between_samples::BetweenSamples;
 
 /// The processed motion of one log and the torques that the estimate predicts along it.
 ///
@@ -84,26 +80,8 @@ pub struct Scene {
     pub angle_doubt_rad: Vec<f64>,
     /// Magnitude at which torque readings are cut off, Nm; `None` where they are not.
     pub torque_limit_nm: Vec<Option<f64>>,
-    /// See [`Self::fine_link_nm`].
-    fine_link_nm: Vec<OnceLock<Vec<f64>>>,
-    /// See [`Self::fine_jolt_nm`].
-    fine_jolt_nm: Vec<OnceLock<Vec<f64>>>,
-    /// See [`Self::fine_bending_nm`].
-    fine_bending_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
-    /// See [`Self::fine_rigid_nm`].
-    fine_rigid_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
-    /// See [`Self::instants`].
-    instants: Vec<OnceLock<Instants>>,
-    /// See [`Self::turned`].
-    turned: Vec<OnceLock<Instants>>,
-    /// See [`Self::sign_if_fed`].
-    signs_if_fed: Vec<[OnceLock<Vec<f64>>; 2]>,
-    /// Correction of the Fourier series of the samples for bends between them.
-    bends: OnceLock<Bends>,
-    /// See [`Self::turning`].
-    turnings: Vec<OnceLock<Turning>>,
-    /// See [`Self::answers`].
-    answers: Vec<OnceLock<Vec<Vec<f64>>>>,
+    /// What has been computed between the samples.
+    between: BetweenSamples,
     /// Fine clock between the samples of a periodic motion.
     clock: Option<FineClock>,
     /// Highest harmonic, below n/2, up to which the accelerations of the periods are known.
@@ -123,42 +101,50 @@ fn noise_of_a_free_reading(prepared: &Prepared, j: usize) -> f64 {
     prepared.torque_limit_nm[j].map_or(all, free)
 }
 
+/// Highest harmonic, below n/2, up to which the accelerations of the periods of `prepared` are known.
+fn highest(prepared: &Prepared) -> usize {
+    (prepared.highest * prepared.motion.samples() as f64) as usize
+}
+
+/// The loads of `rigid_arm` along `prepared`. A periodic motion has a `clock` between its samples.
+fn loads(
+    (model, arm): (&Model, &Arm),
+    rigid_arm: &RigidArm,
+    prepared: &Prepared,
+    clock: Option<&FineClock>,
+) -> Loads {
+    let rate_hz = prepared.processing.rate_hz;
+    match (&prepared.each_period, clock) {
+        (Some(each), Some(clock)) => {
+            let (torque_nm, highest) = (&prepared.torque_nm, highest(prepared));
+            let periods = Periods { each, torque_nm, clock, rate_hz, highest };
+            Loads::agreed((model, arm), &prepared.motion, rigid_arm, &periods)
+        }
+        _ => {
+            let noise = prepared.velocity_noise.as_deref().unwrap_or_default();
+            Loads::as_recorded(arm, &prepared.motion, rigid_arm, (noise, rate_hz))
+        }
+    }
+}
+
 impl Scene {
     /// The scene along `prepared`, for the arm with the base parameters `theta`.
     pub fn new(nominal: &Arm, set: &BaseSet, theta: &[f64], prepared: &Prepared) -> Self {
         let periodic = prepared.replicates.is_some();
-        let mean_of =
-            |y: &JointSignals| y.map_joints(|_, y| mean_period(y, prepared.motion.samples()));
+        let motion = prepared.motion.clone();
+        let (joints, n) = (motion.joints(), motion.samples());
+        let mean_of = |y: &JointSignals| y.map_joints(|_, y| mean_period(y, n));
         let recorded =
             prepared.recorded.as_ref().map(|both| [both.q_rad(), both.qd_rad_s()].map(mean_of));
-        let motion = prepared.motion.clone();
         let (arm, offset_nm) = equivalent_arm(nominal, set, theta);
-        let (joints, n) = (motion.joints(), motion.samples());
         let model = Model::new(&arm);
         let clock = periodic.then(|| FineClock::new(n, FINE));
-        let drive = |j: usize| &arm.joints[j].drive;
-        let recorded_nm = rigid_torque_along(&model, &motion);
-        let mass_kg_m2 = mass_along(&model, &motion, &recorded_nm);
-        let rotor_kg_m2 = rotors_kg_m2(&arm, &mass_kg_m2);
-        let rate_hz = prepared.processing.rate_hz;
-        let highest = (prepared.highest * n as f64) as usize;
-        let loads = match (&prepared.each_period, &clock) {
-            (Some(each), Some(clock)) => {
-                let torque_nm = &prepared.torque_nm;
-                let periods = Periods { each, torque_nm, clock, rate_hz, highest };
-                let along = (&recorded_nm, &mass_kg_m2[..], &rotor_kg_m2[..]);
-                Loads::agreed((&model, &arm), &motion, along, &periods)
-            }
-            _ => {
-                let noise = prepared.velocity_noise.as_deref().unwrap_or_default();
-                let along = (&recorded_nm, &mass_kg_m2[..], &rotor_kg_m2[..]);
-                Loads::as_recorded(&arm, &motion, along, (noise, rate_hz))
-            }
-        };
-        let Loads { link, bending, rigid, delivered, load_nm, mobility_per_kg_m2 } = loads;
-        let LinkTorque { told_nm: link_nm, jolt_nm } = link;
+        let rigid_arm = RigidArm::along(&model, &arm, &motion);
+        let Loads { link, bending, rigid, delivered, load_nm, mobility_per_kg_m2 } =
+            loads((&model, &arm), &rigid_arm, prepared, clock.as_ref());
         let sign =
             motion.qd_rad_s.map_joints(|_, v| v.iter().map(|v| arm.friction_sign(*v)).collect());
+        let drive = |j: usize| &arm.joints[j].drive;
         let torque_nm = JointSignals::from_fn(joints, n, |j, k| {
             load_nm.joint(j)[k]
                 + drive(j).viscous_nm_s_rad * motion.qd_rad_s.joint(j)[k]
@@ -167,52 +153,38 @@ impl Scene {
         });
         // Rounded to a resolution Δ, the true angle lies within ±Δ/2.
         let doubt = |resolution: &f64| if periodic { 0.0 } else { 0.5 * resolution };
-        let angle_doubt_rad = prepared.angle_resolution_rad.iter().map(doubt).collect();
+        let is_described = |joint: &Joint| joint.drive.rotor_inertia_kg_m2 > 0.0;
+        let is_told = |j: usize| set.index_of(Parameter::RotorInertia(j)).is_some();
         Self {
             noise_nm: (0..joints).map(|j| noise_of_a_free_reading(prepared, j)).collect(),
-            mass_kg_m2,
-            angle_doubt_rad,
+            angle_doubt_rad: prepared.angle_resolution_rad.iter().map(doubt).collect(),
+            torque_limit_nm: prepared.torque_limit_nm.clone(),
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
             other_friction: vec![OtherFriction::default(); joints],
-            rate_hz,
+            has_described_rotor: nominal.joints.iter().map(is_described).collect(),
+            tells_rotor: (0..joints).map(is_told).collect(),
+            rate_hz: prepared.processing.rate_hz,
             periods: prepared.processing.periods,
             lead_in_s: prepared.lead_in_s,
+            highest: highest(prepared),
+            recorded_nm: rigid_arm.link_nm,
+            mass_kg_m2: rigid_arm.mass_kg_m2,
+            rotor_kg_m2: rigid_arm.rotor_kg_m2,
+            link_nm: link.told_nm,
+            jolt_nm: link.jolt_nm,
+            between: BetweenSamples::of(joints),
             arm,
             motion,
             periodic,
             recorded,
-            recorded_nm,
-            link_nm,
             load_nm,
-            jolt_nm,
             bending,
             rigid,
             delivered,
-            rotor_kg_m2,
-            has_described_rotor: nominal
-                .joints
-                .iter()
-                .map(|joint| joint.drive.rotor_inertia_kg_m2 > 0.0)
-                .collect(),
-            tells_rotor: (0..joints)
-                .map(|j| set.index_of(Parameter::RotorInertia(j)).is_some())
-                .collect(),
             mobility_per_kg_m2,
             torque_nm,
             sign,
-            torque_limit_nm: prepared.torque_limit_nm.clone(),
-            fine_link_nm: vec![OnceLock::new(); joints],
-            fine_jolt_nm: vec![OnceLock::new(); joints],
-            fine_bending_nm: vec![OnceLock::new(); joints],
-            fine_rigid_nm: vec![OnceLock::new(); joints],
-            instants: (0..joints).map(|_| OnceLock::new()).collect(),
-            turned: (0..joints).map(|_| OnceLock::new()).collect(),
-            signs_if_fed: (0..joints).map(|_| Default::default()).collect(),
-            bends: OnceLock::new(),
-            turnings: (0..joints).map(|_| OnceLock::new()).collect(),
-            answers: vec![OnceLock::new(); joints],
             clock,
-            highest,
         }
     }
 
@@ -228,7 +200,7 @@ impl Scene {
 
     /// Sets [`Self::other_friction`].
     pub fn set_other_friction(&mut self, j: usize, other: OtherFriction) {
-        self.turned[j] = OnceLock::new();
+        self.between.forget_turned(j);
         self.other_friction[j] = other;
     }
 

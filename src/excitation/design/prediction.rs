@@ -95,8 +95,24 @@ impl Prediction {
     /// The `fraction` quantile of the relative σ (linear between order statistics) of the parameters
     /// that are not zero.
     pub fn relative_quantile(&self, fraction: f64) -> f64 {
+        self.quantile_of(fraction, f64::is_finite)
+    }
+
+    /// Number of parameters that will be known better than their own size: σ_i < |θ_i|.
+    pub fn known(&self) -> usize {
+        self.relative_sigma.iter().filter(|r| is_known(**r)).count()
+    }
+
+    /// The `fraction` quantile of the relative σ of the parameters that will be known better than their own size. The
+    /// relative σ of the others says how small they are, not how well they will be known.
+    pub fn known_quantile(&self, fraction: f64) -> f64 {
+        self.quantile_of(fraction, is_known)
+    }
+
+    /// The `fraction` quantile of the relative σ that `counts`; NaN if there is none.
+    fn quantile_of(&self, fraction: f64, counts: fn(f64) -> bool) -> f64 {
         let mut sorted = self.relative_sigma.clone();
-        sorted.retain(|r| r.is_finite());
+        sorted.retain(|r| counts(*r));
         sorted.sort_by(f64::total_cmp);
         if sorted.is_empty() {
             return f64::NAN;
@@ -105,6 +121,11 @@ impl Prediction {
         let low = sorted[at.floor() as usize];
         low + (sorted[at.ceil() as usize] - low) * at.fract()
     }
+}
+
+/// Whether a parameter with this relative σ is known better than its own size.
+fn is_known(relative_sigma: f64) -> bool {
+    relative_sigma < 1.0
 }
 
 /// `samples` equidistant samples of one period.
@@ -119,4 +140,23 @@ pub(super) fn sampled(series: &FourierSeries, samples: usize) -> Motion {
         motion.qdd_rad_s2.set_sample(k, &qdd);
     }
     motion
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A parameter that is zero, and one that is half as large as its σ, say nothing about how well the others will be
+    /// known.
+    #[test]
+    fn small_parameters_are_not_known_badly() {
+        let relative_sigma = vec![0.5, f64::INFINITY, 0.25, 2.0, 0.75];
+        let sigma = vec![1.0; relative_sigma.len()];
+        let p = Prediction { sigma, relative_sigma, condition: 1.0, scaled_condition: 1.0 };
+        assert_eq!(p.known(), 3);
+        assert_eq!([p.known_quantile(0.5), p.known_quantile(1.0)], [0.5, 0.75]);
+        assert_eq!(p.relative_quantile(0.5), 0.625);
+        let p = Prediction { relative_sigma: vec![f64::INFINITY, 2.0], ..p };
+        assert!(p.known() == 0 && p.known_quantile(0.5).is_nan());
+    }
 }

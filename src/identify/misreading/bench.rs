@@ -121,6 +121,7 @@ pub struct Bench {
     noise: Vec<f64>,
     /// Gain from logged values to torques, joint by joint, Nm/A; 1 where they are logged in Nm.
     gain: Vec<f64>,
+    is_of_mean_period: bool,
     mountings: Vec<Mounting>,
 }
 
@@ -180,6 +181,7 @@ impl Bench {
                 effort: as_logged(&thinned(&mean)),
                 noise: prepared.replicates.as_ref().map_or(vec![0.0; arm.dof()], of_mean),
                 gain,
+                is_of_mean_period: true,
                 mountings,
             });
         }
@@ -197,8 +199,14 @@ impl Bench {
             effort: as_logged(&thinned(&torque_nm)),
             noise: vec![0.0; arm.dof()],
             gain,
+            is_of_mean_period: false,
             mountings,
         })
+    }
+
+    /// Whether the mean period is fitted; otherwise it is a single run behind the low-pass.
+    pub fn is_of_mean_period(&self) -> bool {
+        self.is_of_mean_period
     }
 
     /// Adds models for all other mountings.

@@ -47,6 +47,9 @@ pub struct Misreading {
     pub otherwise: Match,
     #[serde(skip)]
     reading: Reading,
+    /// Whether the fits are of the mean period; otherwise of a single run behind the low-pass.
+    #[serde(skip)]
+    is_of_mean_period: bool,
 }
 
 /// Residual share of a joint's torque (rms, without noise) up to which the model counts as explaining that joint.
@@ -92,13 +95,15 @@ impl Misreading {
         }
         bench.add_mountings(arm);
         let (reading, otherwise) = search::best(arm, &bench, &as_read);
-        let found = Self { changes: reading.changes(), as_read, otherwise, reading };
+        let is_of_mean_period = bench.is_of_mean_period();
+        let changes = reading.changes();
+        let found = Self { changes, as_read, otherwise, reading, is_of_mean_period };
         if !found.is_convincing() && !found.is_read_turned() {
             return None;
         }
         let Self { as_read, otherwise, reading, .. } = found;
         let (reading, otherwise) = search::told_by_sign(reading, otherwise, &bench);
-        Some(Self { changes: reading.changes(), as_read, otherwise, reading })
+        Some(Self { changes: reading.changes(), as_read, otherwise, reading, is_of_mean_period })
     }
 
     /// The lines of a layout that reads the log as it was recorded, where `layout` is the one it is read with; `None`
@@ -166,10 +171,15 @@ impl Misreading {
             }
         }
         let there = if joints.len() == self.as_read.left.len() { "" } else { " there" };
+        // A log is identified with other weights and with all of its samples, of which the model leaves other shares.
+        let fitted = match self.is_of_mean_period {
+            true => "fitted to the mean period",
+            false => "fitted to the run behind the low-pass",
+        };
         let pairs = self.as_read.left.iter().zip(&self.otherwise.left);
         let gain = match pairs.into_iter().any(|(read, otherwise)| *read > GROWS * otherwise) {
             true => format!(
-                "the model leaves {} of the torque{there} in place of {}{pushing}",
+                "the model, {fitted}, leaves {} of the torque{there} in place of {}{pushing}",
                 range(&self.otherwise),
                 range(&self.as_read)
             ),

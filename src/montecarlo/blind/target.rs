@@ -162,7 +162,7 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
             [0.97, 1.0],
         ),
         Target::of_cases(
-            "causes named with confidence ≥ 0.99: right",
+            "causes named with confidence ≥ 0.99 in logs whose family is known: right",
             all.iter().map(sure),
             [0.99, 1.0],
         ),

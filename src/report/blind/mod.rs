@@ -143,8 +143,8 @@ fn parts(scores: &Scores) -> Vec<(&'static str, &'static str, Table)> {
     parts
 }
 
-/// The scores as Markdown, with the command that produced them.
-pub fn markdown(scores: &Scores, command: &str) -> String {
+/// The scores as Markdown, with the command that produced them and the `seed` of the trials.
+pub fn markdown(scores: &Scores, command: &str, seed: u64) -> String {
     let mut text = format!(
         "# Does the diagnosis find what is hidden?\n\n{}\n\n    {command}\n",
         sentence(scores)
@@ -156,8 +156,12 @@ pub fn markdown(scores: &Scores, command: &str) -> String {
     for (heading, words, table) in parts(scores) {
         text += &format!("\n## {heading}\n\n{words}\n\n{}", table.to_markdown());
     }
-    text += "\n## Misses\n\nFalse alarms, single effects with √λ ≥ 8 that were not named, pairs of which one was not, \
-             wrong names of withheld families, and strong effects beside which something else was said. `montecarlo --scenario … --trial K` replays trial K.\n";
+    text += &format!(
+        "\n## Misses\n\nFalse alarms, single effects with √λ ≥ 8 that were not named, pairs of which one was not, \
+         wrong names of withheld families, and strong effects beside which something else was said. \
+         `montecarlo --scenario … --seed {seed} --trial K` replays trial K of the scenario “{}”.\n",
+        scores.scenario
+    );
     for line in misses(scores) {
         text += &format!("\n- {line}");
     }

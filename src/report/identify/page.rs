@@ -129,7 +129,10 @@ pub fn page(
     page.extend(result.misread().and_then(MisreadLog::section));
     let fit = Prediction::of(training.regression, &training.identification.fit.theta);
     let section = Section::new("Torque: measured and predicted")
-        .figure(torque_figure("Torque along the training log", &fit)?, "")
+        .figure(
+            torque_figure("Torque along the training log", &fit, result.processing.period_s)?,
+            "",
+        )
         .figure(
             error_figure("What the model leaves", &fit)?,
             "Measured minus predicted torque. Structure that returns at every reversal or with \
@@ -143,7 +146,14 @@ pub fn page(
         page.push(
             Section::new(format!("Validation on {name}"))
                 .paragraph("Nothing is fitted to this log; same processing.")
-                .figure(torque_figure("Torque along the validation log", &v.prediction)?, "")
+                .figure(
+                    torque_figure(
+                        "Torque along the validation log",
+                        &v.prediction,
+                        v.processing.period_s,
+                    )?,
+                    "",
+                )
                 .figure(error_figure("What the model leaves", &v.prediction)?, ""),
         );
     }
@@ -162,14 +172,36 @@ pub fn page(
     Ok(page)
 }
 
+/// Length of the drawn part of a single run, s. On the width of a panel, a good prediction hides what was measured along
+/// a much longer one.
+const DRAWN_S: f64 = 20.0;
+
+/// How many of the rows at `time_s` are drawn, and which these are in words, behind the title: one period of a motion
+/// with the period `period_s`, or the beginning of a single run.
+fn drawn(time_s: &[f64], period_s: Option<f64>) -> (usize, String) {
+    let length_s = period_s.unwrap_or(DRAWN_S);
+    let rows = time_s.iter().take_while(|t_s| **t_s - time_s[0] <= length_s).count();
+    let words = match period_s {
+        _ if rows == time_s.len() => String::new(),
+        Some(period_s) => format!(": its first period, {period_s:.1} s"),
+        None => format!(": its first {DRAWN_S} s"),
+    };
+    (rows, words)
+}
+
 /// Measured and predicted torque, one panel per joint.
-fn torque_figure(title: &str, p: &Prediction) -> std::result::Result<String, ReportError> {
+fn torque_figure(
+    title: &str,
+    p: &Prediction,
+    period_s: Option<f64>,
+) -> std::result::Result<String, ReportError> {
+    let (rows, words) = drawn(&p.time_s, period_s);
     joints_figure(
-        title,
+        &format!("{title}{words}"),
         "Nm",
-        p,
+        &p.time_s[..rows],
         &[
-            ("measured", &p.measured_nm, Colour::MEASURED, Mark::ThinLine),
+            ("measured", &p.measured_nm, Colour::MEASURED, Mark::WideLine),
             ("predicted", &p.predicted_nm, Colour::MODEL, Mark::ThinLine),
         ],
     )
@@ -178,25 +210,26 @@ fn torque_figure(title: &str, p: &Prediction) -> std::result::Result<String, Rep
 /// Measured minus predicted, one panel per joint.
 fn error_figure(title: &str, p: &Prediction) -> std::result::Result<String, ReportError> {
     let error = p.error_nm();
-    joints_figure(title, "Nm", p, &[("residual", &error, Colour::AFTER, Mark::ThinLine)])
+    joints_figure(title, "Nm", &p.time_s, &[("residual", &error, Colour::AFTER, Mark::ThinLine)])
 }
 
 type JointLine<'a> = (&'a str, &'a JointSignals, Colour, Mark);
 
-/// Curves over time, one panel per joint.
+/// Curves over time, one panel per joint. Of longer signals the samples at `time_s`, which are their first, are drawn.
 fn joints_figure(
     title: &str,
     unit: &str,
-    p: &Prediction,
+    time_s: &[f64],
     lines: &[JointLine],
 ) -> std::result::Result<String, ReportError> {
     let mut grid = Grid::new(title, Axis::linear("time", "s"), Axis::linear("torque", unit));
     grid.columns = 2;
     grid.share_x = true;
-    for j in 0..p.measured_nm.joints() {
+    let joints = lines.first().map_or(0, |(_, signals, ..)| signals.joints());
+    for j in 0..joints {
         let mut panel = grid.panel(format!("joint {}", j + 1));
         for (name, signals, colour, mark) in lines {
-            panel = panel.with(*name, &p.time_s, signals.joint(j), *colour, *mark);
+            panel = panel.with(*name, time_s, &signals.joint(j)[..time_s.len()], *colour, *mark);
         }
         grid.panels.push(panel);
     }
@@ -221,4 +254,21 @@ fn relative_sigma_figure(result: &Result) -> std::result::Result<String, ReportE
         })
         .collect();
     Ok(plot.to_svg()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 30 s at 8 Hz, from 2 s on.
+    #[test]
+    fn one_period_or_the_beginning_is_drawn() {
+        let time_s: Vec<f64> = (0..=240).map(|k| 2.0 + 0.125 * f64::from(k)).collect();
+        let said = |rows, words: &str| (rows, words.to_owned());
+        assert_eq!(drawn(&time_s, Some(10.0)), said(81, ": its first period, 10.0 s"));
+        assert_eq!(drawn(&time_s, None), said(161, ": its first 20 s"));
+        assert_eq!(drawn(&time_s[..81], Some(10.0)), said(81, ""));
+        assert_eq!(drawn(&time_s[..81], None), said(81, ""));
+        assert_eq!(drawn(&[], None), said(0, ""));
+    }
 }

@@ -179,6 +179,9 @@ fn swatch(canvas: &Canvas, entry: &Entry, (x, y): Point) -> Result<(), PlotError
     let centre = (x + 0.5 * SWATCH_PX, y);
     match entry.swatch {
         Swatch::Mark(Mark::Line | Mark::ThinLine) => canvas.line(&line, stroke),
+        Swatch::Mark(wide @ Mark::WideLine) => {
+            canvas.line(&line, Stroke { width_px: 4.0, opacity: wide.opacity(), ..stroke })
+        }
         Swatch::Mark(Mark::Dashed) => canvas.line(&line, Stroke { dashed: true, ..stroke }),
         Swatch::Mark(Mark::Dots) => canvas.dot(centre, 3.5, entry.colour, 1.0),
         Swatch::Mark(Mark::DotsAndLine) => {

@@ -53,17 +53,16 @@ impl HeatMap {
         let labels_px = if upwards { widest(&self.column_labels) + 10.0 } else { ROW_PX };
         let heading_px = if self.title.is_empty() { 0.0 } else { ROW_PX + 2.0 };
         let axis_px = if self.column_axis.is_empty() { 0.0 } else { ROW_PX };
-        let top = heading_px + axis_px + labels_px;
-        let cells = Rect {
-            left,
-            top,
-            right: left + columns * cell_px,
-            bottom: top + self.row_labels.len().max(1) as f64 * self.cell_height_px,
-        };
+        let rows_px = self.row_labels.len().max(1) as f64 * self.cell_height_px;
+        // What the rows are is written upwards beside their middle: room for its ends, where it is longer than a few
+        // rows are high.
+        let ends_px = 0.5 * (text_width_px(&self.row_axis, FONT_PX) - rows_px).max(0.0);
+        let top = (heading_px + axis_px + labels_px).max(ends_px);
+        let cells = Rect { left, top, right: left + columns * cell_px, bottom: top + rows_px };
         let title_px = text_width_px(&self.title, TITLE_PX) * 1.1;
         let size = Size {
             width_px: (cells.right + 2.0).max(title_px).max(LEAST_SIZE_PX),
-            height_px: (cells.bottom + 2.0).max(LEAST_SIZE_PX),
+            height_px: (cells.bottom + ends_px.max(2.0)).max(LEAST_SIZE_PX),
         };
         render(size, &self.title, |canvas| {
             canvas.text(&self.title, (0.0, 0.5 * ROW_PX), Anchor::Left, Font::TITLE)?;
@@ -123,8 +122,9 @@ impl HeatMap {
                     right: left + cell_px - 0.5,
                     bottom: top + self.cell_height_px - 0.5,
                 };
-                let share = if full > 0.0 { (value.abs() / full).min(1.0) } else { 0.0 };
-                let share = if share.is_finite() { share } else { 0.0 };
+                // The minimum of NaN and 1 is 1: a cell without a value would be the darkest.
+                let is_shaded = value.is_finite() && full > 0.0;
+                let share = if is_shaded { (value.abs() / full).min(1.0) } else { 0.0 };
                 let dark = if value < 0.0 { DARKEST_NEGATIVE } else { DARKEST };
                 // The square root emphasises small values: off the diagonal, these are the interesting ones.
                 let shade = Colour::STRIPE.towards(dark, share.sqrt());
@@ -169,6 +169,62 @@ impl HeatMap {
         match self.values.iter().enumerate().find(|(_, row)| row.len() != columns) {
             Some((k, row)) => Err(ragged(k, row.len(), columns)),
             None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A map of percents with one column for every value of a row.
+    fn map(values: &[&[f64]]) -> HeatMap {
+        HeatMap {
+            title: String::new(),
+            row_axis: "hidden".into(),
+            column_axis: String::new(),
+            row_labels: vec!["row".into(); values.len()],
+            column_labels: vec!["a".into(); values[0].len()],
+            values: values.iter().map(|row| row.to_vec()).collect(),
+            full_scale: Some(100.0),
+            decimals: 0,
+            cell_height_px: 20.0,
+            cell_width_px: 34.0,
+        }
+    }
+
+    /// Number of cells that are filled with `colour`.
+    fn filled(svg: &str, colour: Colour) -> usize {
+        let Colour { red, green, blue } = colour;
+        let fill = format!("fill=\"#{red:02X}{green:02X}{blue:02X}\"");
+        svg.lines().filter(|line| line.starts_with("<rect") && line.contains(&fill)).count()
+    }
+
+    /// Only the full value is dark: cells without a value, and zeros, have the colour of an empty cell.
+    #[test]
+    fn a_cell_without_a_value_is_empty() {
+        let svg = map(&[&[100.0, f64::NAN, 0.0], &[f64::INFINITY, f64::NAN, -100.0]]);
+        let svg = svg.to_svg().unwrap();
+        let shades = [DARKEST, DARKEST_NEGATIVE, Colour::STRIPE];
+        assert_eq!(shades.map(|shade| filled(&svg, shade)), [1, 1, 4], "{svg}");
+    }
+
+    /// The height of the sheet that the first line of an SVG document states, px.
+    fn height_px(svg: &str) -> f64 {
+        let height = svg.split_once(" height=\"").and_then(|(_, rest)| rest.split_once('"'));
+        height.unwrap().0.parse().unwrap()
+    }
+
+    /// The name of the rows ends half its length below the middle of the rows. Heights are whole pixels.
+    #[test]
+    fn the_name_of_a_few_rows_is_not_cut_off() {
+        let name_px = text_width_px("hidden", FONT_PX);
+        for rows in 1..4_u8 {
+            let values = vec![&[100.0][..]; usize::from(rows)];
+            let rows_px = 20.0 * f64::from(rows);
+            let below_middle_px =
+                height_px(&map(&values).to_svg().unwrap()) - ROW_PX - 0.5 * rows_px;
+            assert!(below_middle_px > 0.5 * name_px - 0.5, "{rows} rows: {below_middle_px}");
         }
     }
 }

@@ -62,8 +62,8 @@ mod tests {
         assert!(!svg.contains("2147483647"), "an integer coordinate overflowed: {svg}");
     }
 
-    const MARKS: [Mark; 5] =
-        [Mark::Line, Mark::ThinLine, Mark::Dashed, Mark::Dots, Mark::DotsAndLine];
+    const MARKS: [Mark; 6] =
+        [Mark::Line, Mark::ThinLine, Mark::WideLine, Mark::Dashed, Mark::Dots, Mark::DotsAndLine];
 
     #[test]
     fn degenerate_data_are_drawn() {

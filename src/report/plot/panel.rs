@@ -67,7 +67,7 @@ pub(super) fn draw(
     }
     // Dense curves are drawn below the bands, because they would hide them.
     let (dense, sparse): (Vec<_>, Vec<_>) =
-        plot.series.iter().zip(series_shares).partition(|(curve, _)| curve.mark == Mark::ThinLine);
+        plot.series.iter().zip(series_shares).partition(|(curve, _)| curve.mark.is_dense());
     for (curve, &share) in dense {
         series(canvas, &frame, curve, share)?;
     }
@@ -108,11 +108,23 @@ fn fair_shares(needs: &[usize], budget: usize) -> Vec<usize> {
     shares
 }
 
+impl Mark {
+    /// Whether it is meant for dense data.
+    fn is_dense(self) -> bool {
+        matches!(self, Self::ThinLine | Self::WideLine)
+    }
+
+    /// Opacity of its line.
+    pub(super) fn opacity(self) -> f64 {
+        if self == Self::WideLine { 0.4 } else { 1.0 }
+    }
+}
+
 impl Series {
     /// Points of the budget that the series needs if no sample is dropped.
     fn cost(&self) -> usize {
         let per_sample = match self.mark {
-            Mark::Line | Mark::ThinLine | Mark::Dashed => 1,
+            Mark::Line | Mark::ThinLine | Mark::WideLine | Mark::Dashed => 1,
             Mark::Dots => POINTS_PER_DOT,
             Mark::DotsAndLine => POINTS_PER_DOT + 1,
         };
@@ -266,12 +278,16 @@ fn series(canvas: &Canvas, frame: &Frame, series: &Series, budget: usize) -> Res
     let width_px = match series.mark {
         Mark::Line => 1.8,
         Mark::ThinLine => 0.9,
+        Mark::WideLine => 4.0,
         Mark::Dashed => 1.6,
         Mark::DotsAndLine => 1.2,
         Mark::Dots => 0.0,
     };
-    let stroke =
-        Stroke { dashed: series.mark == Mark::Dashed, ..Stroke::solid(series.colour, width_px) };
+    let stroke = Stroke {
+        dashed: series.mark == Mark::Dashed,
+        opacity: series.mark.opacity(),
+        ..Stroke::solid(series.colour, width_px)
+    };
     if series.mark != Mark::Dots {
         let bucket = bucket_px(&frame.area, budget);
         for run in trace::runs(series.x.iter().zip(&series.y).map(place)) {

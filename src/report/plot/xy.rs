@@ -14,6 +14,8 @@ pub enum Mark {
     Line,
     /// A thin line for dense data.
     ThinLine,
+    /// A wide, translucent line for dense data that a thin line in front of it follows.
+    WideLine,
     /// A dashed line, for references.
     Dashed,
     /// Dots.

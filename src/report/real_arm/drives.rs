@@ -63,7 +63,8 @@ impl RealArmStudy {
             )
             .say(
                 "A known mass breaks this: the same body must come out right. The scale below is what the gains are to \
-                 be multiplied by; where a joint hardly feels the body its interval is wide (± is half of it, at 95 %).",
+                 be multiplied by; where a joint hardly feels the body its interval is wide (± is half of it, at 95 %; \
+                 an interval that is far from even is given by its ends).",
             )
             .table("Published gains", table)
             .table("What the body of known mass says", scales)

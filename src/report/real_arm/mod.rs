@@ -12,7 +12,7 @@ use super::json::Program;
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, Page, ReportError, Section, Table, Verdict};
 use crate::diagnose::{Cause, Estimate, Finding, Kind, PayloadFinding, Repeated, chance};
-use crate::number::{NONE, significant, with_sigma};
+use crate::number::{NONE, resolved, significant, with_sigma};
 use crate::robot::Arm;
 
 /// A log used in the study.
@@ -107,9 +107,18 @@ fn percents(values: &[f64]) -> String {
     values.iter().map(one).collect::<Vec<_>>().join("  ")
 }
 
-/// Value ± half the width of the 95 % interval.
+/// Value ± half the width of the 95 % interval, or the ends of an interval that is far from even. A value that is known
+/// exactly stands by itself.
 fn pair(e: &Estimate) -> String {
-    with_sigma(e.value, 0.5 * (e.ci95[1] - e.ci95[0]))
+    let [low, high] = e.ci95;
+    let width = high - low;
+    if width == 0.0 {
+        significant(e.value, 4)
+    } else if e.is_uneven() {
+        format!("{} … {}", resolved(low, width), resolved(high, width))
+    } else {
+        with_sigma(e.value, 0.5 * width)
+    }
 }
 
 impl RealArmStudy {
@@ -307,5 +316,18 @@ impl RealArmStudy {
                 "Friction differs between days (the rows “own friction” above say what that costs), and nothing in these \
                  logs, which hold no temperatures, would predict it.",
             )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_intervals_about_the_value_are_written_with_plus_and_minus() {
+        let written = |value, ci95| pair(&Estimate { value, unit: "Nm", ci95 });
+        assert_eq!(written(11.0, [8.5, 13.5]), "11.0 ± 2.5");
+        assert_eq!(written(60000.0, [7758.0, 521_200.0]), "7758 … 521200");
+        assert_eq!(written(85.58, [85.58; 2]), "85.58");
     }
 }
