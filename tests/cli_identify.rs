@@ -83,7 +83,59 @@ fn a_motion_that_does_not_excite_the_arm_is_a_negative_result_not_an_error() {
     assert_eq!(result["processing"], Value::Null);
     assert_eq!(result["not_identified"].as_array().unwrap().len(), 52);
     assert!(folder.read("rest.html").contains("no joint moves"));
-    folder.armid("diagnose rest.csv --robot ur5").says(3, &["declined", "armid excite"]);
+    let words = ["declined, no joint moves. Record a motion", "armid excite"];
+    folder.armid("diagnose rest.csv --robot ur5").says(3, &words);
+}
+
+/// The tip of the argument parser, to write `-- -3`, is none: the range of the option is what helps.
+#[test]
+fn a_negative_number_is_refused_by_its_range() {
+    let folder = Folder::empty();
+    folder.write("log.csv", log([0.5; 6], 1000));
+    let refused = |words: &str, code: i32, expected: &str| {
+        let said = folder.armid(words).says(code, &[expected]);
+        assert!(!said.contains("unexpected argument"), "{said}");
+    };
+    let positive = "must be a positive number";
+    for command in ["identify", "diagnose"] {
+        for option in ["--cutoff", "--rate", "--period"] {
+            let expected = format!("{option} -3: {positive}");
+            refused(&format!("{command} log.csv --robot ur5 {option} -3"), 1, &expected);
+        }
+    }
+    let weight = "identify log.csv --robot ur5 --physical --prior-weight -1";
+    refused(weight, 2, "expected a positive number or auto");
+    refused("diagnose log.csv --robot ur5 --known-payload -1", 2, positive);
+    for (option, code, expected) in [
+        ("--order -3", 2, "must be a whole number of at least 1"),
+        ("--period -1", 1, "the period = -1 must be positive"),
+        ("--period-range -1,2", 1, "the shortest period = -1 must be positive"),
+        ("--clearance -1", 1, "the clearance = -1 must be finite and not negative"),
+        ("--velocity-share -1", 1, "--velocity-share -1: must be in (0, 1]"),
+        ("--torque-share -1", 1, "the share of the torque = -1 must be in (0, 1]"),
+        ("--noise-nm -1", 1, "the torque noise of joint 1 = -1 must be positive"),
+        ("--data -1", 1, "the length of the data = -1 must be positive"),
+        ("--rate -1", 1, "the sampling rate = -1 must be positive"),
+        ("--starts -1", 2, "must be a whole number of at least 1"),
+        ("--finalists -1", 2, "must be a whole number of at least 1"),
+        ("--seed -1", 2, "must be a whole number of at least 0"),
+        ("--seconds -1", 1, "--seconds -1: must be positive"),
+        ("--threads -1", 2, "-1 is not in 1..=65535"),
+        ("--csv t.csv --speed -1", 1, "a speed of -1 cannot be played"),
+    ] {
+        refused(&format!("excite --robot ur5 --out t.json {option}"), code, expected);
+    }
+    refused("simulate --out log.csv --trial -1", 2, "must be a whole number of at least 0");
+    for study in ["noise s.toml", "paper", "cutoff", "physical s.toml"] {
+        let words = format!("study {study} --trials -1");
+        refused(&words, 2, "must be a whole number of at least 2");
+    }
+    refused("study noise s.toml --slow-every -1", 2, "must be a whole number of at least 1");
+    for (option, least) in [("--trials", 1), ("--trial", 0), ("--seed", 0)] {
+        let expected = format!("must be a whole number of at least {least}");
+        folder.montecarlo(&format!("{option} -1")).says(2, &[&expected]);
+    }
+    folder.montecarlo("--threads -1").says(2, &["-1 is not in 1..=65535"]);
 }
 
 /// Joint 1 of this arm turns too fast for a sample per second. It does not rest: a higher rate is all it takes.
@@ -100,6 +152,17 @@ fn a_rate_too_low_for_the_motion_is_not_called_rest() {
     for options in ["--rate 0.5", "--rate 0.5 --period 0"] {
         let words = format!("identify run.csv --robot ur5 {options}");
         folder.armid(&words).says(1, &["run.csv: in samples at 0.5 Hz (--rate) the motion"]);
+    }
+    // The options may also be the reason where all joints seem to move: of what stays open, and of what is not explained.
+    let of_rate = |hz: &str| format!("--rate lowered the rate from 125 Hz to {hz} Hz");
+    let first = format!("{}: leave that out first", of_rate("2.00"));
+    folder.armid("identify run.csv --robot ur5 --rate 2").says(3, &["Declined", &first]);
+    let alone = format!("{}, which alone can be its cause: leave that out", of_rate("4.00"));
+    folder.armid("identify run.csv --robot ur5 --rate 4").says(0, &["not to be trusted", &alone]);
+    for (cutoff, code, named) in [("0.15", 3, "0.150"), ("0.5", 0, "0.500")] {
+        let lowered = format!("the cut-off of the low-pass from 10.0 Hz to {named} Hz: leave that");
+        let words = format!("identify run.csv --robot ur5 --period 0 --cutoff {cutoff}");
+        folder.armid(&words).says(code, &[&lowered]);
     }
 }
 

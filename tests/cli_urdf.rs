@@ -68,6 +68,56 @@ fn an_arm_with_a_gripper_is_named_by_its_last_link() {
     folder.armid("base --robot ur5#hand").complains(1, &["ur5#hand"]);
 }
 
+/// Commands that are about something else than the file of the arm say in one line what was assumed about it.
+#[test]
+fn usual_assumptions_are_told_in_a_line() {
+    let folder = Folder::empty();
+    let (arm, text) = ur5();
+    folder.write("arm.urdf", text);
+    folder.write("result.json", result_of(&arm, "arm.urdf"));
+    let export = folder.armid("export result.json --mjcf out.xml");
+    export.complains(
+        0,
+        &[
+            "note: arm.urdf: assumed or interpreted: gravity 9.81 m/s2 along -z of \"base_link\"; ",
+            "; rotor inertia 0, gear ratio 1, torque constant 1 Nm/A; ",
+            "; acceleration limit 10 rad/s2 (in full: armid base --robot arm.urdf)",
+        ],
+    );
+    assert_eq!(export.stderr.matches("note: arm.urdf").count(), 1, "{}", export.stderr);
+    let full = folder.armid("base --robot arm.urdf");
+    full.complains(
+        0,
+        &["note: arm.urdf: no acceleration limit, taken as 10 rad/s2: shoulder_pan,"],
+    );
+    assert!(!full.stderr.contains("in full"), "{}", full.stderr);
+}
+
+/// A drive file about a whole arm serves a part of it, too: what lies behind the last link is none of that part's.
+#[test]
+fn a_drive_file_of_a_longer_arm_fits_a_shorter_one() {
+    let folder = Folder::empty();
+    let (arm, text) = ur5();
+    let drives = drive_file(&arm, &[0.0; 6]);
+    folder.write("arm.urdf", text);
+    folder.write("arm.drives.toml", &drives);
+    folder.armid("base --robot arm.urdf#wrist_1_link").says(0, &["base parameters"]);
+    let part = Arm::load(&format!("{}#wrist_1_link", folder.path("arm.urdf").display())).unwrap();
+    assert_eq!(part.dof(), 4);
+    let names = |arm: &Arm| -> Vec<[String; 2]> {
+        let capsules = &arm.clearance.capsules;
+        let kept = arm.clearance.pairs.iter().filter(|p| p.iter().all(|k| capsules[*k].body <= 4));
+        kept.map(|pair| pair.map(|k| capsules[k].name.clone())).collect()
+    };
+    assert_eq!(names(&part), names(&arm));
+    assert_eq!(part.clearance.pairs.len(), names(&part).len());
+    let kept = arm.clearance.capsules.iter().filter(|capsule| capsule.body <= 4);
+    assert!(part.clearance.capsules.iter().eq(kept), "{:?}", part.clearance.capsules);
+    // Of a whole arm, such a body is a mistake.
+    folder.write("arm.drives.toml", drives.replace("body = 6", "body = 7"));
+    folder.armid("base --robot arm.urdf").complains(1, &["body = 7 must be 0 (the base)"]);
+}
+
 /// The properties in an exported model are read; the missing ones are reported, and a drive file beside it supplies
 /// them.
 #[test]

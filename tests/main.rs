@@ -20,6 +20,7 @@ mod cli_formats;
 mod cli_identify;
 mod cli_montecarlo;
 mod cli_physical;
+mod cli_predict;
 mod cli_study;
 mod cli_urdf;
 mod damaged_logs;

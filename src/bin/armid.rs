@@ -20,6 +20,7 @@ enum Task {
     Excite(cli::excite::ExciteArgs),
     Export(cli::export::ExportArgs),
     Identify(cli::identify::IdentifyArgs),
+    Predict(cli::predict::PredictArgs),
     Simulate(cli::simulate::SimulateArgs),
     Study(cli::study::StudyArgs),
 }
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Task::Excite(args) => cli::excite::run(&args),
         Task::Export(args) => cli::export::run(&args),
         Task::Identify(args) => cli::identify::run(&args),
+        Task::Predict(args) => cli::predict::run(&args),
         Task::Simulate(args) => cli::simulate::run(&args),
         Task::Study(args) => cli::study::run(&args),
     })

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::robot::{inputs, load_robot};
+use super::robot::{inputs, load_robot_in_full};
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::output::check_outputs;
@@ -50,7 +50,7 @@ struct Term<'a> {
 
 /// Runs the command.
 pub fn run(args: &BaseArgs) -> CommandResult {
-    let LoadedArm { arm, files, .. } = load_robot(&args.robot)?;
+    let LoadedArm { arm, files, .. } = load_robot_in_full(&args.robot)?;
     check_outputs(&args.json, &files)?;
     let parameterisation = Parameterisation::of(&arm, args.reduced.as_deref())?;
     let set = BaseSet::find(&arm, parameterisation)?;

@@ -9,12 +9,14 @@ use super::identify::{LoadedLog, ProcessingArgs, RowsOf, SourceArgs, read_logs};
 use super::simulated::Simulated;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
-use crate::diagnose::{DIAGNOSE_SCHEMA, DiagnoseError, Diagnoser, Diagnosis, Validation};
+use crate::diagnose::{DIAGNOSE_SCHEMA, Diagnoser, Diagnosis, Validation};
 use crate::dynamics::Model;
-use crate::log::{Layout, Log};
+use crate::identify::{Identifier, nothing_moves};
+use crate::log::Log;
 use crate::montecarlo::Scenario;
 use crate::output::{OutputError, check_outputs};
 use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
+use crate::report::identify::NOTHING_MOVES;
 use crate::report::json::{Document, Program};
 use crate::report::misread::MisreadLog;
 use crate::report::replay::table as replay_table;
@@ -39,7 +41,7 @@ pub struct DiagnoseArgs {
     #[arg(long, value_name = "SCENARIO|RESULT")]
     sim: Option<PathBuf>,
     /// Known mass, kg, of the body in the second log; it determines the scale of the drive gains.
-    #[arg(long = "known-payload", value_name = "KG", value_parser = mass)]
+    #[arg(long = "known-payload", value_name = "KG", value_parser = mass, allow_negative_numbers = true)]
     known_payload_kg: Option<f64>,
     /// Put the causes back into the simulation and let it replay the log and the held-out ones. Takes seconds per
     /// log, or minutes where stiff effects need short steps.
@@ -127,7 +129,16 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     let nominal = simulation.as_ref().map(Simulated::nominal);
     let mut finding = match diagnoser.diagnose(&log.measurement(), &validations, nominal) {
         Err(error) if error.is_declined() => {
-            return decline(args, &layout, &log.log, &error, program);
+            let at_rest = error.misreading().is_none()
+                && nothing_moves(&mut Identifier::new(&model, &set, options), &log.measurement());
+            let sentence = match at_rest {
+                true => format!("{}: declined, {NOTHING_MOVES}", log.log.source),
+                false => error.declined(&log.log.source),
+            };
+            let misreading = error.misreading().cloned();
+            let misread = misreading
+                .map(|misreading| MisreadLog::new(log.log.source.clone(), misreading, &layout));
+            return decline(args, &log.log, sentence, misread, program);
         }
         finding => finding?,
     };
@@ -233,19 +244,15 @@ fn mass(text: &str) -> Result<f64, String> {
     if is_mass { Ok(mass) } else { Err("must be a positive number".into()) }
 }
 
-/// Reports on a log that cannot be diagnosed: its motion does not identify the model, or its channels have to be read
-/// differently.
+/// Reports on a log that cannot be diagnosed, for the reason in `sentence`: its motion does not identify the model, or
+/// its channels have to be read differently.
 fn decline(
     args: &DiagnoseArgs,
-    layout: &Layout,
     log: &Log,
-    error: &DiagnoseError,
+    sentence: String,
+    misread: Option<MisreadLog>,
     program: Program,
 ) -> CommandResult {
-    let sentence = error.declined(&log.source);
-    let misreading = error.misreading().cloned();
-    let misread =
-        misreading.map(|misreading| MisreadLog::new(log.source.clone(), misreading, layout));
     say!("{sentence}");
     if let Some(advice) = misread.as_ref().and_then(MisreadLog::advice) {
         say!("\n{advice}\n");

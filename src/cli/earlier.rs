@@ -129,6 +129,20 @@ impl EarlierResult {
         self.base_parameters.iter().position(is_it)
     }
 
+    /// Index in the result of every base parameter of `set`; the error says which one it lacks.
+    pub(super) fn places(&self, set: &BaseSet) -> Result<Vec<usize>, String> {
+        let place = |k: usize| {
+            let found = self.place(set, k);
+            found.ok_or_else(|| format!("no base parameter {}", set.formula(k)))
+        };
+        (0..set.rank()).map(place).collect()
+    }
+
+    /// Values of the base parameters at `places`.
+    pub(super) fn values(&self, places: &[usize]) -> Vec<f64> {
+        places.iter().map(|&place| self.base_parameters[place].value).collect()
+    }
+
     /// Covariance of the base parameters at `places`; diagonal from σ if no covariance was saved. The error says what
     /// is wrong with it.
     pub(super) fn covariance(&self, places: &[usize]) -> Result<DMatrix<f64>, String> {

@@ -15,6 +15,7 @@ use thiserror::Error as ThisError;
 use clearance::{cell_box, say_what_helps, say_what_is_watched};
 use record::Record;
 
+use super::count::at_least;
 use super::prior::Prior;
 use super::robot::{inputs, load_robot};
 use super::{CommandResult, Outcome, Progress, interrupt_flag, threads_or_all};
@@ -42,13 +43,24 @@ pub struct ExciteArgs {
     #[arg(long, value_enum, default_value = "d")]
     criterion: CriterionName,
     /// Order of the Fourier series.
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = 5, allow_negative_numbers = true, value_parser = at_least(1_usize))]
     order: usize,
     /// Period, s.
-    #[arg(long = "period", value_name = "S", default_value_t = 10.0)]
+    #[arg(
+        long = "period",
+        value_name = "S",
+        default_value_t = 10.0,
+        allow_negative_numbers = true
+    )]
     period_s: f64,
     /// Let the base frequency be free, with periods between these, s: LOW,HIGH.
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1)]
+    #[arg(
+        long,
+        value_name = "LOW,HIGH",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true
+    )]
     period_range: Option<Vec<f64>>,
     /// Centres of the joints' motions (the constant terms of their series), rad: `free`, which is the default, or a
     /// number for each joint, such as 0,-1.5708,0,0,0,free.
@@ -58,44 +70,65 @@ pub struct ExciteArgs {
     #[arg(long)]
     rest_start: bool,
     /// Smallest distance of the arm from itself, the floor and boxes, m.
-    #[arg(long = "clearance", value_name = "M", default_value_t = 0.02)]
+    #[arg(
+        long = "clearance",
+        value_name = "M",
+        default_value_t = 0.02,
+        allow_negative_numbers = true
+    )]
     clearance_m: f64,
     /// A box in the cell to stay clear of: two corners in the base frame, m. May be given several times.
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true)]
     boxes: Vec<String>,
     /// Share of the speed limits that the motion may use. Below 1 it leaves room for drives that overshoot, because
     /// controllers stop the arm at its speed limit.
-    #[arg(long, value_name = "0…1", default_value_t = 1.0)]
+    #[arg(long, value_name = "0…1", default_value_t = 1.0, allow_negative_numbers = true)]
     velocity_share: f64,
     /// Share of the torque limits the nominal model may need.
-    #[arg(long, value_name = "0…1", default_value_t = 0.9)]
+    #[arg(long, value_name = "0…1", default_value_t = 0.9, allow_negative_numbers = true)]
     torque_share: f64,
     /// Torque noise, Nm: one number for all joints or one for each. Default: 0.6 % of the torque limits.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', num_args = 1)]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true
+    )]
     noise_nm: Option<Vec<f64>>,
     /// Length of the periodic part of the motion, s, in whole periods that cover it. Run-in and run-out are added.
-    #[arg(long = "data", value_name = "S", default_value_t = 80.0)]
+    #[arg(long = "data", value_name = "S", default_value_t = 80.0, allow_negative_numbers = true)]
     data_s: f64,
     /// Rate of the data and of the CSV, Hz. The URScript has a set point every 8 ms at any rate.
-    #[arg(long = "rate", value_name = "HZ", default_value_t = 125.0)]
+    #[arg(
+        long = "rate",
+        value_name = "HZ",
+        default_value_t = 125.0,
+        allow_negative_numbers = true
+    )]
     rate_hz: f64,
     /// Result of an earlier identification. The motion is designed for the parameters that are still poorly known.
     #[arg(long, value_name = "RESULT.json")]
     prior: Option<PathBuf>,
     /// Random motions from which the search starts.
-    #[arg(long, default_value_t = 48)]
+    #[arg(long, default_value_t = 48, allow_negative_numbers = true, value_parser = at_least(1_usize))]
     starts: usize,
     /// How many of the best starts are optimised to the end.
-    #[arg(long, default_value_t = 4)]
+    #[arg(long, default_value_t = 4, allow_negative_numbers = true, value_parser = at_least(1_usize))]
     finalists: usize,
     /// Seed of the random starts.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = at_least(0_u64))]
     seed: u64,
     /// Stop after this time and keep the best design so far, s.
-    #[arg(long = "seconds", value_name = "S", default_value_t = 120.0)]
+    #[arg(
+        long = "seconds",
+        value_name = "S",
+        default_value_t = 120.0,
+        allow_negative_numbers = true
+    )]
     seconds: f64,
     /// Threads; default: all cores. The result does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     /// Trajectory file; a scenario for `simulate` and `montecarlo` names it as `[motion] trajectory`.
     #[arg(long, value_name = "FILE.json")]
@@ -108,7 +141,13 @@ pub struct ExciteArgs {
     urscript: Option<PathBuf>,
     /// Speed of what --csv and --urscript write, as a fraction of the designed one: the same path, played more slowly.
     /// In the URScript it is the line `speed = …`.
-    #[arg(long, value_name = "0.01…1", default_value_t = 1.0, requires = "played")]
+    #[arg(
+        long,
+        value_name = "0.01…1",
+        default_value_t = 1.0,
+        requires = "played",
+        allow_negative_numbers = true
+    )]
     speed: f64,
     /// Report page.
     #[arg(long, value_name = "FILE.html")]
@@ -168,7 +207,7 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     let speed = Speed::new(args.speed)
         .map_err(|error| BadOption::new("speed", args.speed, error.to_string()))?;
     let arm = arm;
-    say_what_is_watched(&args.robot, &arm, &args.boxes)?;
+    say_what_is_watched(&args.robot, &arm, &notices, &args.boxes)?;
     let playback = playback(args, &arm, speed)?;
     let base = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let spec = specification(args, &arm, &base)?;

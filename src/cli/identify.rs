@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
@@ -56,7 +56,7 @@ pub struct IdentifyArgs {
     prior: PriorMetric,
     /// Weight of the robot file's values: 1/s² treats them as known to a relative σ of s (1: to 100 %; 100: to 10 %),
     /// auto takes the weight that predicts left-out periods best.
-    #[arg(long, requires = "physical", default_value_t)]
+    #[arg(long, requires = "physical", default_value_t, allow_negative_numbers = true)]
     prior_weight: PriorWeight,
     /// Write the result as JSON.
     #[arg(long)]
@@ -84,13 +84,13 @@ pub struct SourceArgs {
 pub struct ProcessingArgs {
     /// Cut-off of the low-pass on torque and regressor of a single run, Hz [default: 10]. A motion that repeats needs
     /// no low-pass.
-    #[arg(long = "cutoff", value_name = "HZ")]
+    #[arg(long = "cutoff", value_name = "HZ", allow_negative_numbers = true)]
     cutoff_hz: Option<f64>,
     /// Rate to which the log is resampled, Hz. Default: its own, but logs above 300 Hz are decimated to 150 to 300 Hz.
-    #[arg(long = "rate", value_name = "HZ")]
+    #[arg(long = "rate", value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: Option<f64>,
     /// Period of the motion, s. Default: found in the log; 0 treats the log as a single run.
-    #[arg(long = "period", value_name = "S")]
+    #[arg(long = "period", value_name = "S", allow_negative_numbers = true)]
     period_s: Option<f64>,
     /// Estimator. Default: spectral if at least four periods repeat, otherwise wls.
     #[arg(long, value_enum)]
@@ -101,20 +101,13 @@ impl ProcessingArgs {
     /// Checks the options and converts them to those of the library.
     pub fn options(&self) -> Result<Options, String> {
         let default = Options::default();
-        let options = Options {
+        checked(Options {
             estimator: self.estimator,
             cutoff_hz: self.cutoff_hz.unwrap_or(default.cutoff_hz),
             rate_hz: self.rate_hz,
             repetition: self.period_s.into(),
             ..default
-        };
-        match options.improper() {
-            Some(Improper { key, value, requirement }) => {
-                let name = key.trim_end_matches("_hz").trim_end_matches("_s");
-                Err(format!("--{name} {value}: {requirement}"))
-            }
-            None => Ok(options),
-        }
+        })
     }
 
     /// A warning about a given option that the `processing` did not use.
@@ -123,6 +116,17 @@ impl ProcessingArgs {
             "--cutoff is not used: the motion repeats, and is averaged in place of filtered (--period 0 treats it as a single run)"
                 .to_owned()
         })
+    }
+}
+
+/// Refuses options that no log can be processed with, by their names on the command line.
+pub fn checked(options: Options) -> Result<Options, String> {
+    match options.improper() {
+        Some(Improper { key, value, requirement }) => {
+            let name = key.trim_end_matches("_hz").trim_end_matches("_s");
+            Err(format!("--{name} {value}: {requirement}"))
+        }
+        None => Ok(options),
     }
 }
 
@@ -139,6 +143,20 @@ pub struct LoadedLog {
 }
 
 impl LoadedLog {
+    /// Reads a log and prints how many of its rows were used or set aside.
+    pub fn read(
+        file: &Path,
+        arm: &Arm,
+        layout: &Layout,
+    ) -> Result<Self, Box<dyn std::error::Error>> {
+        let mut log = read_log(file, layout, arm.dof())?;
+        log.warn_of_assumed_gains(arm);
+        eprintln!("{}:\n{}", file.display(), log.rows);
+        let torque_nm = log.torque_nm(arm)?;
+        let input = Input { path: file.to_owned(), sha256: log.sha256.clone() };
+        Ok(Self { log, torque_nm, input, mended: Vec::new() })
+    }
+
     /// The channels that identification needs.
     pub fn measurement(&self) -> Measurement<'_> {
         Measurement {
@@ -158,7 +176,7 @@ const SAME: f64 = 0.5;
 impl LoadedLog {
     /// Corrects what can be corrected within its rows, and remarks on every other fault of the record. Logs that cannot be
     /// processed are left to the identification, which says why.
-    fn mend(&mut self) {
+    pub fn mend(&mut self) {
         let Ok(Mended { time_s, channels, remarks }) = Mended::of(&self.measurement()) else {
             return;
         };
@@ -169,7 +187,7 @@ impl LoadedLog {
     }
 
     /// How the log has to be read, if not as it was.
-    fn misreading(
+    pub fn misreading(
         &self,
         arm: &Arm,
         regression: &Regression,
@@ -220,21 +238,13 @@ impl SourceArgs {
     }
 }
 
-/// Reads logs and prints how many rows of each were used or set aside.
+/// Reads logs and prints how many rows of each were used or set aside ([`LoadedLog::read`]).
 pub fn read_logs(
     files: &[PathBuf],
     arm: &Arm,
     layout: &Layout,
 ) -> Result<Vec<LoadedLog>, Box<dyn std::error::Error>> {
-    let read = |file: &PathBuf| {
-        let mut log = read_log(file, layout, arm.dof())?;
-        log.warn_of_assumed_gains(arm);
-        eprintln!("{}:\n{}", file.display(), log.rows);
-        let torque_nm = log.torque_nm(arm)?;
-        let input = Input { path: file.clone(), sha256: log.sha256.clone() };
-        Ok(LoadedLog { log, torque_nm, input, mended: Vec::new() })
-    };
-    files.iter().map(read).collect()
+    files.iter().map(|file| LoadedLog::read(file, arm, layout)).collect()
 }
 
 /// What the command reads.

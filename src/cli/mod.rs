@@ -13,6 +13,7 @@ macro_rules! say {
 
 mod arm_result;
 pub mod base;
+mod count;
 pub mod diagnose;
 mod earlier;
 pub mod excite;
@@ -20,6 +21,7 @@ pub mod export;
 pub mod identify;
 pub mod montecarlo;
 mod outputs;
+pub mod predict;
 mod prior;
 mod robot;
 pub mod simulate;

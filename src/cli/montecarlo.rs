@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
 
+use super::count::at_least;
 use super::outputs::Outputs;
 use super::robot::inputs;
 use super::{CommandResult, Outcome, Progress, interrupt_flag, simulating, threads_or_all};
@@ -52,18 +53,18 @@ struct RunArgs {
     #[arg(long)]
     scenario: Option<PathBuf>,
     /// Number of trials instead of the scenario's.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, allow_negative_numbers = true, value_parser = at_least(1_u64))]
     trials: Option<u64>,
     /// Run this one trial alone (from 0) and print its estimates.
     #[arg(long, conflicts_with_all = [
         "trials", "threads", "shard", "out", "resume", "json", "report", "markdown",
-    ])]
+    ], allow_negative_numbers = true, value_parser = at_least(0_u64))]
     trial: Option<u64>,
     /// Seed instead of the scenario's.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true, value_parser = at_least(0_u64))]
     seed: Option<u64>,
     /// Threads; all cores where left out. Results do not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     /// Run only part I of N (I from 0) of the trials; needs --out.
     #[arg(long, value_name = "I/N", requires = "out")]

@@ -8,13 +8,39 @@ use thiserror::Error;
 use crate::base::{BaseSet, Parameterisation};
 use crate::report::ReportError;
 use crate::report::json::Input;
-use crate::robot::{Arm, Kinematics, KinematicsDifference, LoadedArm, RobotError};
+use crate::robot::{Arm, Kinematics, KinematicsDifference, LoadedArm, RobotError, UrdfNotice};
 
-/// Loads the robot given by `--robot` and prints the assumptions made about it.
+/// Loads the robot given by `--robot` and prints the assumptions made about it, in one line where they are usual ones.
 pub fn load_robot(name_or_path: &str) -> Result<LoadedArm, RobotError> {
+    load_and_tell(name_or_path, |notices| {
+        let mut brief: Vec<String> = notices.iter().filter_map(UrdfNotice::brief).collect();
+        // There is a notice for every body with fixed links.
+        brief.dedup();
+        let line = format!(
+            "assumed or interpreted: {} (in full: armid base --robot {name_or_path})",
+            brief.join("; ")
+        );
+        let is_long = |notice: &&UrdfNotice| {
+            notice.brief().is_none() && !matches!(notice, UrdfNotice::Shapes(_))
+        };
+        let long = notices.iter().filter(is_long).map(ToString::to_string);
+        (!brief.is_empty()).then_some(line).into_iter().chain(long).collect()
+    })
+}
+
+/// As [`load_robot`], with every assumption in full.
+pub fn load_robot_in_full(name_or_path: &str) -> Result<LoadedArm, RobotError> {
+    load_and_tell(name_or_path, |notices| notices.iter().map(ToString::to_string).collect())
+}
+
+/// Loads a robot and prints the `lines` about its notices.
+fn load_and_tell(
+    name_or_path: &str,
+    lines: impl Fn(&[UrdfNotice]) -> Vec<String>,
+) -> Result<LoadedArm, RobotError> {
     let loaded = LoadedArm::load(name_or_path)?;
-    for notice in &loaded.notices {
-        eprintln!("note: {name_or_path}: {notice}");
+    for line in lines(&loaded.notices) {
+        eprintln!("note: {name_or_path}: {line}");
     }
     let arm = &loaded.arm;
     // A rank that is not clear is the business of the commands that need it.

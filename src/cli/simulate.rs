@@ -6,6 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::arm_result::ArmResult;
+use super::count::at_least;
 use super::robot::inputs;
 use super::{CommandResult, Outcome, simulating};
 use crate::dynamics::Model;
@@ -36,7 +37,7 @@ pub struct SimulateArgs {
     #[arg(long)]
     out: PathBuf,
     /// Trial whose noise is used, counted from 0.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = at_least(0_u64))]
     trial: u64,
     /// Write the true parameters and the hidden effects as JSON.
     #[arg(long)]

@@ -76,11 +76,7 @@ impl Simulated {
                  that result: run `armid diagnose` on that log first."
             ),
         });
-        let place = |k: usize| {
-            let found = result.place(set, k);
-            found.ok_or_else(|| format!("{name}: no base parameter {}", set.formula(k)))
-        };
-        let places: Vec<usize> = (0..set.rank()).map(place).collect::<Result<_, _>>()?;
+        let places = result.places(set).map_err(|fault| format!("{name}: {fault}"))?;
         let covariance = result.covariance(&places).map_err(|fault| format!("{name}: {fault}"))?;
         let warning = result.lacks_covariance().then(|| {
             format!(
@@ -88,9 +84,8 @@ impl Simulated {
                  small changes are not told until it is identified again"
             )
         });
-        let theta = places.iter().map(|&k| result.parameters()[k].value).collect();
         Ok(Self {
-            theta,
+            theta: result.values(&places),
             covariance: Some(covariance),
             freedom: result.degrees_of_freedom(),
             doubt,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::count::at_least;
 use super::outputs::Outputs;
 use super::robot::inputs;
 use super::{CommandResult, Progress};
@@ -18,7 +19,7 @@ pub(super) struct CutoffArgs {
     #[arg(default_value = "sims/cutoff.toml")]
     scenario: PathBuf,
     /// Trials per point instead of the scenario's own.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
+    #[arg(long, allow_negative_numbers = true, value_parser = at_least(2_u64))]
     trials: Option<u64>,
     #[command(flatten)]
     output: Outputs,

@@ -6,6 +6,7 @@ use clap::Args;
 use serde::Deserialize;
 use thiserror::Error;
 
+use super::count::at_least;
 use super::outputs::Outputs;
 use super::robot::inputs;
 use super::{CommandResult, Progress, threads_or_all};
@@ -24,13 +25,13 @@ pub(super) struct NoiseArgs {
     #[arg(long, value_name = "JSON", num_args = 1..)]
     from: Vec<PathBuf>,
     /// At most this many trials per scenario; each scenario's own number where left out.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
+    #[arg(long, allow_negative_numbers = true, value_parser = at_least(2_u64))]
     trials: Option<u64>,
     /// Run the costly methods (bootstrap, HAC, instruments, …) on every so many trials only.
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = 5, allow_negative_numbers = true, value_parser = at_least(1_u64))]
     slow_every: u64,
     /// Threads; all cores where left out.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     #[command(flatten)]
     output: Outputs,

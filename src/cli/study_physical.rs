@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::count::at_least;
 use super::outputs::Outputs;
 use super::robot::inputs;
 use super::{CommandResult, Progress, threads_or_all};
@@ -21,10 +22,10 @@ pub struct PhysicalArgs {
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
     /// Trials per scenario instead of each scenario's own.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
+    #[arg(long, allow_negative_numbers = true, value_parser = at_least(2_u64))]
     trials: Option<u64>,
     /// Threads; all cores where left out.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     #[command(flatten)]
     output: Outputs,

@@ -112,17 +112,18 @@ impl<M: Reference> Reference for Slowed<'_, M> {
     }
 }
 
+/// The columns of a motion's samples: `timestamp, target_q_0…, target_qd_0…, target_qdd_0…` (s, rad, rad/s, rad/s²).
+pub(super) fn columns(joints: usize) -> Vec<String> {
+    let of_joints = |name: &'static str| (0..joints).map(move |j| format!("{name}_{j}"));
+    let motion = ["target_q", "target_qd", "target_qdd"].into_iter().flat_map(of_joints);
+    std::iter::once("timestamp".to_owned()).chain(motion).collect()
+}
+
 /// Writes `motion` sampled at `rate_hz` with the header `timestamp, target_q_0…, target_qd_0…,
-/// target_qdd_0…` (s, rad, rad/s, rad/s²).
+/// target_qdd_0…` (s, rad, rad/s, rad/s²). [`PlannedMotion`](super::PlannedMotion) reads it back.
 pub fn write_csv(out: &mut dyn Write, motion: &impl Reference, rate_hz: f64) -> io::Result<()> {
     let n = motion.joints();
-    let mut header = String::from("timestamp");
-    for name in ["target_q", "target_qd", "target_qdd"] {
-        for j in 0..n {
-            header.push_str(&format!(",{name}_{j}"));
-        }
-    }
-    writeln!(out, "{header}")?;
+    writeln!(out, "{}", columns(n).join(","))?;
     let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     let last = (motion.duration_s() * rate_hz).round() as usize;
     for k in 0..=last {

@@ -242,6 +242,12 @@ fn gap_warning(gaps: &[Gap], kept_s: [f64; 2]) -> Option<String> {
     ))
 }
 
+/// Rate that a log with the time stamps `time_s` has where none is asked for, Hz.
+pub(super) fn usual_rate_hz(time_s: &[f64]) -> Result<f64, SignalError> {
+    let natural_hz = natural_rate_hz(time_s)?;
+    Ok(natural_hz / whole_parts(natural_hz, Options::HIGHEST_RATE_HZ) as f64)
+}
+
 /// Smallest whole number that divides `rate_hz` into at most `highest_hz`, or a thousandth more.
 fn whole_parts(rate_hz: f64, highest_hz: f64) -> usize {
     (rate_hz / highest_hz * 0.999).ceil().max(1.0) as usize

@@ -120,7 +120,12 @@ impl GravityMatch {
         let far = format!("gravity torque is {times} times what the description of {robot} says");
         let thousands = ratio.abs().log10() / 3.0;
         if (thousands.abs() - 1.0).abs() < OFF_THOUSAND {
-            format!("{far}: a current or torque is logged in another unit (mA for A, mNm for Nm)")
+            let unit = if thousands > 0.0 {
+                "(mA for A, mNm for Nm)"
+            } else {
+                "(kA for A, kNm for Nm), or its layout divides by 1000 where it should not"
+            };
+            format!("{far}: a current or torque is logged in another unit {unit}")
         } else if self.is_reversed() {
             format!(
                 "{far}: torques or angles are logged with the other sign, or the arm hangs upside down and its description does not"
@@ -209,11 +214,13 @@ mod tests {
         let turned = remark(turned);
         assert!(turned.text.contains("the other sign") && turned.is_reversed, "{turned:?}");
 
-        for factor in [1e-3, 1.3e3] {
+        for (factor, unit) in [(1e-3, "kNm for Nm"), (1.3e3, "mNm for Nm")] {
             let scaled: Vec<f64> = nominal.iter().map(|value| factor * value).collect();
             let scaled = GravityMatch::of(&arm, &set, &nominal, &scaled, &known).unwrap();
             let remark = remark(scaled).text;
             assert!(remark.contains("another unit") && !remark.contains("0.00 times"), "{remark}");
+            // What is logged in mNm and read as Nm is too large, not too small.
+            assert!(remark.contains(unit), "{remark}");
         }
 
         // Where the first moments are hardly known, twice the gravity proves nothing about the robot. A common σ of

@@ -6,6 +6,7 @@ use super::error::IdentifyError;
 use super::estimation::{Estimate, Estimation, MotionAids};
 use super::fit::Estimator;
 use super::identification::{Identification, explainable};
+use super::lowered::Lowered;
 use super::measurement::Measurement;
 use super::motion_noise::moved_to_mean;
 use super::options::Options;
@@ -131,6 +132,7 @@ impl<'a> Identifier<'a> {
         let problem = std::mem::replace(&mut self.problem, empty);
         let mut regression =
             Regression::of(m.source, prepared, problem, instruments, [first_sample, every]);
+        regression.lowered = Lowered::of(&self.options, m, &regression.prepared.processing);
         if self.options.rate_hz.is_some() {
             regression.outpaced = outpaced(m, &regression.course());
         }

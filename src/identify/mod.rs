@@ -4,7 +4,8 @@
 //! [`Model`](crate::dynamics::Model) of the arm and its [`BaseSet`](crate::base::BaseSet). Leaves: the log on an even
 //! clock, laid out as equations ([`Regression`]); base parameters with their covariance and a test of what the model
 //! lacks ([`Identification`]), or how the log should have been read ([`Misreading`]); the torque predicted along
-//! other logs ([`Prediction`]); standard parameters that a real arm can have ([`physical`]).
+//! other logs ([`Prediction`]) and planned motions ([`Forecast`]); standard parameters that a real arm can have
+//! ([`physical`]).
 
 pub mod covariance;
 pub mod physical;
@@ -18,10 +19,12 @@ mod error;
 mod estimation;
 mod even;
 mod fit;
+mod forecast;
 mod gravity;
 mod identification;
 mod identifier;
 mod lack_of_fit;
+mod lowered;
 mod measurement;
 mod misreading;
 mod motion_noise;
@@ -50,9 +53,11 @@ pub use error::IdentifyError;
 pub use estimation::{Estimate, Estimation, MotionAids};
 pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
+pub use forecast::{Forecast, prediction_sd};
 pub use identification::Identification;
 pub use identifier::{Identifier, MANY_PERIODS, kept_every};
 pub use lack_of_fit::{Floor, LackOfFit, by_noise_in_words};
+pub use lowered::Lowered;
 pub use measurement::Measurement;
 pub use misreading::{Change, Channels, Match, Misreading};
 pub use options::{Improper, Options, Repetition};
@@ -64,7 +69,7 @@ pub use problem::{Assembler, Domain, Panel, Problem};
 pub use quality::{Condition, identifies_the_arm, not_identified, plausible_size};
 pub use regression::Regression;
 pub use residual::Residual;
-pub use rest::Rest;
+pub use rest::{Rest, nothing_moves};
 pub use several_logs::SeveralLogs;
 pub use triangle::Triangle;
 pub use unlike::unlike;

@@ -3,6 +3,7 @@
 use super::course::Course;
 use super::error::IdentifyError;
 use super::identifier::SAME_RATE;
+use super::lowered::Lowered;
 use super::prepared::{Prepared, Processing};
 use super::problem::Problem;
 
@@ -18,6 +19,8 @@ pub struct Regression {
     pub first_sample: usize,
     /// Samples of `prepared` per sample of `problem` (long logs are thinned after the filter).
     pub every: usize,
+    /// What options lowered for every log.
+    pub lowered: Vec<Lowered>,
     /// Joints (0-based) that move in every log, too fast for the rate asked for.
     pub(super) outpaced: Vec<usize>,
     /// Where the log comes from, or the logs that are joined, for messages.
@@ -35,8 +38,17 @@ impl Regression {
         instruments: Option<Problem>,
         [first_sample, every]: [usize; 2],
     ) -> Self {
-        let (outpaced, log) = (Vec::new(), log.to_owned());
-        Self { problem, instruments, prepared, first_sample, every, outpaced, log, course: None }
+        Self {
+            problem,
+            instruments,
+            prepared,
+            first_sample,
+            every,
+            lowered: Vec::new(),
+            outpaced: Vec::new(),
+            log: log.to_owned(),
+            course: None,
+        }
     }
 
     /// The sample of `prepared` that belongs to row `row` of one period (or of the run).
@@ -89,6 +101,8 @@ impl Regression {
         let Prepared { processing, warnings, .. } = &mut first.prepared;
         *processing = Processing { logs, periods: 1, harmonics: None, ..processing.clone() };
         warnings.extend(rest.iter().flat_map(|other| other.prepared.warnings.clone()));
+        let is_in = |other: &Self, one: &Lowered| other.lowered.iter().any(|l| l.is_like(one));
+        first.lowered.retain(|one| rest.iter().all(|other| is_in(other, one)));
         first.outpaced.retain(|j| rest.iter().all(|other| other.outpaced.contains(j)));
         first.log =
             std::iter::once(&first).chain(&rest).map(|r| &*r.log).collect::<Vec<_>>().join(", ");

@@ -1,6 +1,9 @@
 //! Joints that do not move, and joints whose motion is lost between samples that are too far apart.
 
 use super::course::Course;
+use super::error::IdentifyError;
+use super::identifier::Identifier;
+use super::lowered::Lowered;
 use super::measurement::Measurement;
 use super::prediction::resting_joints;
 use super::regression::Regression;
@@ -18,6 +21,8 @@ pub struct Rest {
     pub outpaced: Vec<usize>,
     /// Rate of the rows, Hz.
     pub rate_hz: f64,
+    /// What options lowered, which can take a part of any motion away.
+    pub lowered: Vec<Lowered>,
 }
 
 impl Rest {
@@ -26,7 +31,16 @@ impl Rest {
         let outpaced = regression.outpaced.clone();
         let mut still = resting_joints(&regression.course().qd_rad_s);
         still.retain(|j| !outpaced.contains(j));
-        Self { still, outpaced, rate_hz: regression.prepared.processing.rate_hz }
+        let rate_hz = regression.prepared.processing.rate_hz;
+        Self { still, outpaced, rate_hz, lowered: regression.lowered.clone() }
+    }
+}
+
+/// Whether no joint moves along the log `m`, as `identifier` reads it.
+pub fn nothing_moves(identifier: &mut Identifier, m: &Measurement) -> bool {
+    match identifier.regression(m) {
+        Ok(regression) => Rest::of(&regression).still.len() == m.q_rad.joints(),
+        Err(error) => matches!(error, IdentifyError::NoMotion { .. }),
     }
 }
 

@@ -30,4 +30,5 @@ pub use layout::{Joints, Layout, LayoutFault, built_in_layout_names};
 pub use read::{read_log, read_log_from};
 pub use record::{Effort, Log};
 pub use unit_suspicion::UnitSuspicion;
+pub(crate) use write::write_columns;
 pub use write::write_log;

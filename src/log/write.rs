@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 use super::error::LogError;
 use super::lines::hexadecimal;
 use super::record::{Effort, Log};
-use crate::output::write_atomically;
+use crate::output::{OutputError, write_atomically};
 use crate::robot::JointSignals;
 
 /// Writes a log as comma-separated values with RTDE column names.
@@ -35,15 +35,32 @@ pub fn write_log(path: &Path, log: &Log) -> Result<String, LogError> {
         }
     }
     let mut hash = Sha256::new();
+    write_columns(path, &columns, |line| hash.update(line))?;
+    Ok(hexadecimal(hash))
+}
+
+/// Writes columns of equal length, with their names in a header, as comma-separated values; passes every line to
+/// `seen`.
+///
+/// Every number is written in the shortest form that reads back to the same bits. The file appears whole or not at all.
+///
+/// # Errors
+/// [`OutputError`] if the file cannot be written.
+pub(crate) fn write_columns(
+    path: &Path,
+    columns: &[(String, &[f64])],
+    mut seen: impl FnMut(&[u8]),
+) -> Result<(), OutputError> {
+    let samples = columns.first().map_or(0, |(_, values)| values.len());
     write_atomically(path, |file| {
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         let mut line = names.join(",").into_bytes();
-        for k in 0..=log.samples() {
+        for k in 0..=samples {
             line.push(b'\n');
-            hash.update(&line);
+            seen(&line);
             file.write_all(&line)?;
             line.clear();
-            if k < log.samples() {
+            if k < samples {
                 for (i, (_, values)) in columns.iter().enumerate() {
                     let comma = if i == 0 { "" } else { "," };
                     // Debug rather than Display, because it switches to exponents where that is shorter.
@@ -52,8 +69,7 @@ pub fn write_log(path: &Path, log: &Log) -> Result<String, LogError> {
             }
         }
         Ok(())
-    })?;
-    Ok(hexadecimal(hash))
+    })
 }
 
 /// All columns with their names, in the order in which they are written.

@@ -148,6 +148,7 @@ impl RobotFile {
             capsules: &self.capsules,
             pairs: &self.collision_pairs,
             boxes: &self.boxes,
+            bodies_behind: 0,
         };
         let clearance = keys.added_to(Clearance::default(), self.joints.len(), &place)?;
         let mut angles = RightAngles::default();

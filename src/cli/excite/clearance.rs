@@ -8,13 +8,17 @@ use crate::excitation::design::DesignError;
 use crate::report::excitation::NO_CLEARANCE;
 use crate::robot::{Arm, CellBox, ShapeNotice, UrdfNotice};
 
-/// Tells the user which parts of the arm named by `robot` are not watched. Refuses `boxes` for an arm without capsules,
-/// because there is nothing to keep clear of them.
+/// Tells the user which parts of the arm named by `robot`, about which there are these `notices`, are watched and which
+/// not. Refuses `boxes` for an arm without capsules, because there is nothing to keep clear of them.
 pub(super) fn say_what_is_watched(
     robot: &str,
     arm: &Arm,
+    notices: &[UrdfNotice],
     boxes: &[String],
 ) -> Result<(), BadOption> {
+    for notice in notices.iter().filter(|notice| matches!(notice, UrdfNotice::Shapes(_))) {
+        eprintln!("note: {robot}: {notice}");
+    }
     if ClearanceModel::new(arm).is_empty() {
         if !boxes.is_empty() {
             let message = "the robot has no capsules whose distance could be watched: describe them in its .toml, or in the \

@@ -45,7 +45,8 @@ pub struct PayloadFinding {
     /// Common scale of all drive gains that follows from the known mass; null where no mass was given or no body is
     /// named.
     pub gain_scale: Option<Estimate>,
-    /// The scale of each joint's own drive gain, likewise.
+    /// The scale of each joint's own drive gain, likewise; written as null where the motions do not tell it.
+    #[serde(serialize_with = "words::only_told")]
     pub joint_gain_scales: Option<Vec<Estimate>>,
     /// Change of Coulomb friction per joint from the first log to the second, Nm.
     pub coulomb_change_nm: Vec<Estimate>,

@@ -1,5 +1,7 @@
 //! What is said about a body on the flange.
 
+use serde::{Serialize, Serializer};
+
 use super::super::verdict::Estimate;
 use super::PayloadFinding;
 use crate::number::significant;
@@ -111,17 +113,31 @@ fn is_told(scale: &Estimate) -> bool {
     0.5 * (scale.ci95[1] - scale.ci95[0]) < TOLD_WITHIN * scale.value
 }
 
+/// Writes `scales` of gains without the numbers of those that are not told, as the sentences do.
+pub(super) fn only_told<S: Serializer>(
+    scales: &Option<Vec<Estimate>>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let told = |scale: &Estimate| match is_told(scale) {
+        true => scale.clone(),
+        false => Estimate { value: f64::NAN, unit: scale.unit, ci95: [f64::NAN; 2] },
+    };
+    let told: Option<Vec<Estimate>> =
+        scales.as_ref().map(|scales| scales.iter().map(told).collect());
+    told.serialize(serializer)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// What is said of a second log with this mass and first moment more on the flange, at this probability that chance
-    /// explains them.
-    fn said(mass_kg: f64, moment_kg_m: f64, probability: f64) -> String {
-        let known_to = |half: f64| {
-            move |value: f64| Estimate { value, unit: "", ci95: [value - half, value + half] }
-        };
-        let finding = PayloadFinding {
+    fn known_to(half: f64) -> impl Fn(f64) -> Estimate {
+        move |value| Estimate { value, unit: "", ci95: [value - half, value + half] }
+    }
+
+    /// A second log with this mass and first moment more on the flange, at this probability that chance explains them.
+    fn finding(mass_kg: f64, moment_kg_m: f64, probability: f64) -> PayloadFinding {
+        PayloadFinding {
             reference: "bare.csv".to_owned(),
             mass_kg: known_to(0.02)(mass_kg),
             first_moment_kg_m: [moment_kg_m, 0.0, f64::NAN].map(known_to(0.004)),
@@ -132,8 +148,26 @@ mod tests {
             joint_gain_scales: None,
             coulomb_change_nm: Vec::new(),
             was_touched: false,
-        };
-        finding.sentences().join(" ")
+        }
+    }
+
+    /// What is said of it.
+    fn said(mass_kg: f64, moment_kg_m: f64, probability: f64) -> String {
+        finding(mass_kg, moment_kg_m, probability).sentences().join(" ")
+    }
+
+    /// A reader of the JSON must not take for a result what the sentence calls none.
+    #[test]
+    fn scales_that_are_not_told_are_null() {
+        let scales = vec![known_to(0.118)(1.057), known_to(0.02)(1.05)];
+        let finding = PayloadFinding { joint_gain_scales: Some(scales), ..finding(2.0, 0.1, 1e-9) };
+        let said = finding.sentences().join(" ");
+        let words = "joint 1: not told by these motions, joint 2: 1.050 ± 0.020.";
+        assert!(said.contains(words), "{said}");
+        let written = serde_json::to_value(&finding).unwrap();
+        let [first, second] = [0, 1].map(|j| &written["joint_gain_scales"][j]);
+        assert!(first["value"].is_null() && first["ci95"][1].is_null(), "{first}");
+        assert_eq!(second["value"], 1.05);
     }
 
     /// Chance is named only where it explains the difference: a gripper that was turned, or exchanged for one as heavy,

@@ -3,13 +3,17 @@
 use serde::Serialize;
 
 use super::{BaseParameter, NOT_IDENTIFIED};
-use crate::identify::{Processing, Regression, Rest};
+use crate::identify::{Lowered, Processing, Regression, Rest};
 use crate::log::Log;
 use crate::number::significant;
 use crate::report::json::Program;
 use crate::report::rows::{Rows, log_warnings, names};
 use crate::report::{Page, Status, Verdict};
 use crate::robot::Arm;
+
+/// What is said of a log at rest, behind the word that it is declined.
+pub const NOTHING_MOVES: &str =
+    "no joint moves. Record a motion that excites all parameters (armid excite).";
 
 /// Sentences on the joints whose motion is missing, with a blank behind each; empty if there are none.
 pub(super) fn rest_in_words(rest: &Rest) -> String {
@@ -33,10 +37,15 @@ pub(super) fn rest_in_words(rest: &Rest) -> String {
 }
 
 /// What helps where a motion does not identify the arm.
-pub(super) fn remedy(rest: &Rest) -> &'static str {
-    match &rest.outpaced[..] {
-        [] => "Record a motion that excites them (armid excite).",
-        _ => "The rate is too low for this motion: give a higher one, or none.",
+pub(super) fn remedy(rest: &Rest) -> String {
+    if !rest.outpaced.is_empty() {
+        return "The rate is too low for this motion: give a higher one, or none.".to_owned();
+    }
+    match Lowered::in_words(&rest.lowered) {
+        None => "Record a motion that excites them (armid excite).".to_owned(),
+        Some(lowered) => format!(
+            "{lowered}: leave that out first. If it is not the reason, record a motion that excites them (armid excite)."
+        ),
     }
 }
 
@@ -93,8 +102,7 @@ impl Declined {
     /// The verdict in a sentence.
     pub fn sentence(&self) -> String {
         if self.rest.still.len() == self.joints {
-            return "Declined: no joint moves. Record a motion that excites all parameters (armid excite)."
-                .to_owned();
+            return format!("Declined: {NOTHING_MOVES}");
         }
         format!(
             "Declined: this motion does not identify the arm. {}Along it the columns of {} vanish or \

@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use super::Training;
 use crate::identify::{
-    Agreement, Floor, Identification, LackOfFit, MANY_PERIODS, Processing, by_noise_in_words,
+    Agreement, Floor, Identification, LackOfFit, Lowered, MANY_PERIODS, Processing,
+    by_noise_in_words,
 };
 use crate::signal::Replicates;
 
@@ -91,7 +92,7 @@ pub struct TestResult {
 impl Intervals {
     /// Judges the intervals by the tests of lack of fit and of agreement.
     pub fn of(training: &Training) -> Self {
-        let alone = Self::of_fit(training.identification);
+        let alone = Self::of_fit(training.identification, &training.regression.lowered);
         let Some(agreement) = &training.identification.agreement else { return alone };
         let result = AgreementResult::of(agreement, training);
         let (trusted, reason) = match (agreement.holds(), alone.trusted) {
@@ -123,7 +124,8 @@ impl Intervals {
         Self { trusted, reason, agreement: Some(result), ..alone }
     }
 
-    fn of_fit(identification: &Identification) -> Self {
+    /// Judges them by the test of lack of fit alone, where options `lowered` what the log would have without them.
+    fn of_fit(identification: &Identification, lowered: &[Lowered]) -> Self {
         let Some(test) = identification.lack_of_fit else {
             let asked_for = identification.estimator;
             let Processing { logs, periods, .. } = identification.processing;
@@ -167,10 +169,16 @@ impl Intervals {
                  {scatter} leads to expect (F test; {by_noise}, the model is rejected below {level})."
             )
         } else {
+            let whence = match Lowered::in_words(lowered) {
+                None => "; armid diagnose looks for its cause.".to_owned(),
+                Some(lowered) => format!(
+                    ". {lowered}, which alone can be its cause: leave that out before armid diagnose looks for another."
+                ),
+            };
             format!(
                 "The 95 % intervals are not to be trusted: the square of what repeats in the torque and is not explained{along} is \
                  {statistic:.2} times what {scatter} would leave (F test; {by_noise}). They cover the noise, not the \
-                 error of the model; armid diagnose looks for its cause."
+                 error of the model{whence}"
             )
         };
         Self {

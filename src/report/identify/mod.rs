@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-pub use declined::Declined;
+pub use declined::{Declined, NOTHING_MOVES};
 use declined::{remedy, rest_in_words};
 pub use intervals::{AgreementResult, Intervals, TestResult};
 pub use page::{facts, page, parameter_table, residual_table};
@@ -25,8 +25,8 @@ use crate::base::BaseSet;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
-    Condition, Doubt, Estimator, FitError, Identification, Prediction, Processing, Regression,
-    Residual, Rest, drive_limit_remark, identifies_the_arm, not_identified, unlike,
+    Condition, Doubt, Estimator, FitError, Identification, Lowered, Prediction, Processing,
+    Regression, Residual, Rest, drive_limit_remark, identifies_the_arm, not_identified, unlike,
 };
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
@@ -121,6 +121,7 @@ impl Training<'_> {
         warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
         warnings.extend(few_degrees_of_freedom(identification.covariance.degrees_of_freedom));
         warnings.extend(doubt.map(Doubt::sentence));
+        warnings.extend(doubt.and_then(|_| self.lowered()));
         // For a misread log, no further remark about the fit makes sense.
         warnings.extend(unrelated(&identification.residual()).filter(|_| self.misread.is_none()));
         let described = Prediction::of(regression, &identification.fit.theta);
@@ -129,6 +130,13 @@ impl Training<'_> {
         warnings.extend(self.logs.iter().filter_map(|log| self.drive_limits(log)));
         warnings.extend(validations.iter().flat_map(|validation| validation.warnings.clone()));
         warnings
+    }
+
+    /// A remark on options that can be the reason of a doubt. Where the model fails, the intervals say so.
+    fn lowered(&self) -> Option<String> {
+        let fails = self.identification.lack_of_fit.is_some_and(|lack| !lack.fits());
+        let lowered = Lowered::in_words(&self.regression.lowered).filter(|_| !fails)?;
+        Some(format!("{lowered}: leave that out before you look for another reason"))
     }
 
     /// A remark on drives at their limits in `log`.
@@ -397,11 +405,13 @@ impl Result {
         let percent = self.residual.relative_percent.iter();
         let (low, high) = percent.fold((f64::INFINITY, 0f64), |(l, h), &p| (l.min(p), h.max(p)));
         // No motion is designed for a reduced set.
-        let help = match self.reduced {
-            None => {
+        let help = match (Lowered::in_words(&self.rest.lowered), &self.reduced) {
+            (Some(lowered), _) => format!(". {lowered}: leave that out first"),
+            (None, None) => {
                 "; a motion designed for what is open helps (`armid excite --prior RESULT.json`)"
+                    .to_owned()
             }
-            Some(_) => "",
+            (None, Some(_)) => String::new(),
         };
         let open = match self.not_identified.len() {
             0 => String::new(),

@@ -130,7 +130,8 @@ pub fn drive_file_of_mjcf(
         entry.velocity_rad_s = stated.then_some(joint.limits.velocity_rad_s);
         entry.torque_nm = own.entry(&joint.name).and_then(|before| before.torque_nm);
     }
-    let file = DriveFile { clearance: own.clearance, unwatched_pairs: own.unwatched_pairs, ..file };
+    let unwatched_pairs = own.unwatched_in(&arm.clearance);
+    let file = DriveFile { clearance: own.clearance, unwatched_pairs, ..file };
     Ok(file.text())
 }
 
@@ -193,7 +194,7 @@ impl DriveFile {
         }
         arm.torque_offsets = self.torque_offsets.unwrap_or(arm.torque_offsets);
         arm.drive_gains_assumed = self.drive_gains_assumed.unwrap_or(arm.drive_gains_assumed);
-        self.add_clearance(arm, &place)?;
+        self.add_clearance(arm, locked.len(), &place)?;
         for joint in &mut arm.joints {
             if let Some(entry) = self.entry(&joint.name) {
                 entry.apply(joint, &place.table("joint", &entry.name))?;

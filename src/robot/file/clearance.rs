@@ -32,11 +32,14 @@ pub(in crate::robot) struct ClearanceKeys<'a> {
     pub pairs: &'a [[String; 2]],
     /// `[[box]]`.
     pub boxes: &'a [BoxEntry],
+    /// Number of bodies that the file may have behind the last one of the arm: where the arm ends with a link of a longer
+    /// chain, the file is about the whole chain.
+    pub bodies_behind: usize,
 }
 
 impl ClearanceKeys<'_> {
     /// Adds these keys, checked, to the `clearance` of an arm with `bodies` moving bodies. A capsule replaces one of
-    /// the same name.
+    /// the same name. Capsules of bodies behind these, and pairs with them, are left out.
     pub(in crate::robot) fn added_to(
         &self,
         mut clearance: Clearance,
@@ -46,14 +49,23 @@ impl ClearanceKeys<'_> {
         place.finite("floor_z_m", self.floor_z_m.as_slice())?;
         place.unique("capsule", self.capsules.iter().map(|capsule| capsule.name.as_str()))?;
         clearance.floor_z_m = self.floor_z_m.or(clearance.floor_z_m);
-        for entry in self.capsules {
+        let is_behind =
+            |entry: &CapsuleEntry| (bodies + 1..=bodies + self.bodies_behind).contains(&entry.body);
+        for entry in self.capsules.iter().filter(|entry| !is_behind(entry)) {
             let capsule = entry.capsule(place, bodies)?;
             match clearance.capsules.iter().position(|known| known.name == capsule.name) {
                 Some(at) => clearance.capsules[at] = capsule,
                 None => clearance.capsules.push(capsule),
             }
         }
-        for names in self.pairs {
+        // A shape of the model may have the name of a capsule that is left out: its pairs stay.
+        let behind = self.capsules.iter().filter(|entry| is_behind(entry));
+        let left_out: Vec<&str> = behind
+            .map(|entry| entry.name.as_str())
+            .filter(|name| clearance.capsules.iter().all(|capsule| capsule.name != *name))
+            .collect();
+        let is_left_out = |name: &String| left_out.contains(&name.as_str());
+        for names in self.pairs.iter().filter(|names| !names.iter().any(is_left_out)) {
             let pair @ [one, other] = pair(&clearance, "collision_pairs", names, place)?;
             if !clearance.pairs.contains(&pair) && !clearance.pairs.contains(&[other, one]) {
                 clearance.pairs.push(pair);

@@ -6,6 +6,7 @@
 //! [`UrdfFault`] that says what is wrong, where, and what to do about it.
 
 mod arm;
+mod brief;
 mod chain;
 mod collision;
 mod fault;

@@ -19,8 +19,15 @@ pub(super) enum Source {
 }
 
 impl DriveFile {
-    /// Adds what the file says about clearance to that of `arm`, which comes from the shapes of its links.
-    pub(super) fn add_clearance(&self, arm: &mut Arm, place: &Place) -> Result<(), RobotError> {
+    /// Adds what the file says about clearance to that of `arm`, which comes from the shapes of its links. The file may
+    /// also be about the bodies of `locked` further joints, which count in those of the arm: what it says about them is
+    /// left out.
+    pub(super) fn add_clearance(
+        &self,
+        arm: &mut Arm,
+        locked: usize,
+        place: &Place,
+    ) -> Result<(), RobotError> {
         let of_shapes = std::mem::take(&mut arm.clearance);
         let begin = if self.sets_shapes_aside() { Clearance::default() } else { of_shapes };
         let keys = ClearanceKeys {
@@ -28,14 +35,24 @@ impl DriveFile {
             capsules: &self.capsules,
             pairs: &self.collision_pairs,
             boxes: &self.boxes,
+            bodies_behind: locked,
         };
         let mut clearance = keys.added_to(begin, arm.dof(), place)?;
         for names in &self.unwatched_pairs {
+            // The shapes of a locked link are part of the body that carries it, and need not keep its name.
+            if locked > 0 && !are_there(&clearance, names) {
+                continue;
+            }
             let [one, other] = pair(&clearance, "unwatched_pairs", names, place)?;
             clearance.pairs.retain(|known| *known != [one, other] && *known != [other, one]);
         }
         arm.clearance = clearance;
         Ok(())
+    }
+
+    /// Pairs of the file that are not kept apart, as far as `clearance` has both capsules.
+    pub(super) fn unwatched_in(&self, clearance: &Clearance) -> Vec<[String; 2]> {
+        self.unwatched_pairs.iter().filter(|names| are_there(clearance, names)).cloned().collect()
     }
 
     /// Whether only the file's own keys count.
@@ -44,15 +61,25 @@ impl DriveFile {
     }
 }
 
+/// Whether `clearance` has the two capsules of these names.
+fn are_there(clearance: &Clearance, names: &[String; 2]) -> bool {
+    names.iter().all(|name| clearance.capsules.iter().any(|capsule| capsule.name == *name))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::export::drive_file_of_urdf;
+    use crate::robot::export::{drive_file_of_mjcf, drive_file_of_urdf};
 
     fn cleared(text: &str) -> Result<Clearance, String> {
+        cleared_with(text, &[])
+    }
+
+    /// The clearance of the arm with the drive file `text`, where these joints of its model are locked.
+    fn cleared_with(text: &str, locked: &[&str]) -> Result<Clearance, String> {
         let mut arm = Arm::built_in("ur5").unwrap();
         let file = DriveFile::read(text, "x.drives.toml").map_err(|e| e.to_string())?;
-        file.apply(&mut arm, &[], "x.drives.toml").map_err(|e| e.to_string())?;
+        file.apply(&mut arm, locked, "x.drives.toml").map_err(|e| e.to_string())?;
         Ok(arm.clearance)
     }
 
@@ -90,6 +117,25 @@ mod tests {
         let written = drive_file_of_urdf(&arm, &[0.0; 6], &text, "x.drives.toml").unwrap();
         assert_eq!(cleared(&written), cleared(&text));
         assert!(!drive_file_of_urdf(&arm, &[0.0; 6], "", "").unwrap().contains("capsule"));
+    }
+
+    /// One more joint is locked, so that the file may be about a seventh body, and not about an eighth.
+    #[test]
+    fn what_is_behind_the_last_link_is_left_out() {
+        let behind = TOOL.replace("body = 6", "body = 7");
+        let pairs = "collision_pairs = [[\"tool\", \"base\"]]\nunwatched_pairs = [[\"tool\", \"forearm\"]]\n";
+        let text = format!("{pairs}{behind}");
+        let of_shapes = Arm::built_in("ur5").unwrap().clearance;
+        assert_eq!(cleared_with(&text, &["finger"]).unwrap(), of_shapes);
+        let farther = cleared_with(&text.replace("body = 7", "body = 8"), &["finger"]).unwrap_err();
+        assert!(farther.contains("body = 8 must be 0 (the base) or one of 1 … 6"), "{farther}");
+        let unknown = cleared_with("collision_pairs = [[\"tool\", \"base\"]]", &["finger"]);
+        assert!(unknown.unwrap_err().contains("\"tool\", which is not there"));
+        // The drive file of an MJCF, which has no joints but the arm's, does not name them either.
+        let arm = Arm::built_in("ur5").unwrap();
+        let written = drive_file_of_mjcf(&arm, &[0.0; 6], &text, "x.drives.toml").unwrap();
+        assert!(!written.contains("tool"), "{written}");
+        assert_eq!(cleared(&written).unwrap(), of_shapes);
     }
 
     #[test]
