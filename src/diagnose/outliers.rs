@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::data_faults::{FAR, step_s};
+use super::data_faults::{FAR, MOVES_RAD_S, step_s};
 use super::kind::Kind;
 use super::record::Record;
 use super::verdict::{Cause, Estimate};
@@ -35,6 +35,11 @@ const ABRUPT: f64 = 0.5;
 /// white noise with standard deviation σ that median is 0.95 σ to within a third; a wild value is off by at least
 /// 8 √2 σ.
 const ABOVE_USUAL: f64 = 3.0;
+
+/// Where a joint starts or stops, its friction is there a row or two before its acceleration, or goes before it: the
+/// torque then has a peak as abrupt as a wild value, but within the range of the others. That is within this time of an
+/// end of a rest that lasts at least as long, s.
+const STOPS_S: f64 = 0.1;
 
 /// Wild readings of one channel of a joint.
 pub struct Strays {
@@ -79,7 +84,10 @@ fn mend_torque(record: &mut Record) -> Vec<Strays> {
     let of_joint = |j: usize| {
         let y = record.torque_nm.joint(j);
         let far = far_off(y);
-        let alone = |run: &&[Stray]| stands_alone(y, run, &far);
+        let stops = starts_or_stops(record.qd_rad_s.joint(j), &record.time_s);
+        let widest_nm = if far.is_empty() { 0.0 } else { spread(y) };
+        let is_of_a_stop = |stray: &Stray| stops[stray.row] && stray.off.abs() < widest_nm;
+        let alone = |run: &&[Stray]| stands_alone(y, run, &far) && !run.iter().any(is_of_a_stop);
         let of_one_run =
             |a: &Stray, b: &Stray| a.row + 1 == b.row && a.off.signum() == b.off.signum();
         let runs = far.chunk_by(of_one_run).filter(alone);
@@ -88,6 +96,34 @@ fn mend_torque(record: &mut Record) -> Vec<Strays> {
     let joints = (0..record.torque_nm.joints()).into_par_iter();
     let found = joints.map(|j| (j, of_joint(j))).collect();
     replace(&mut record.torque_nm, "torque", found)
+}
+
+/// Whether each row is within [`STOPS_S`] of a row at which a joint with the velocities `qd_rad_s` comes to rest or starts
+/// from one.
+fn starts_or_stops(qd_rad_s: &[f64], time_s: &[f64]) -> Vec<bool> {
+    let mut stops = vec![false; qd_rad_s.len()];
+    let mut row = 0;
+    for same in qd_rad_s.chunk_by(|a, b| (a.abs() < MOVES_RAD_S) == (b.abs() < MOVES_RAD_S)) {
+        let (first, last) = (row, row + same.len() - 1);
+        row += same.len();
+        if same[0].abs() >= MOVES_RAD_S || time_s[last] - time_s[first] < STOPS_S {
+            continue;
+        }
+        for end_s in [time_s[first], time_s[last]] {
+            let from = time_s.partition_point(|s| *s < end_s - STOPS_S);
+            let to = time_s.partition_point(|s| *s <= end_s + STOPS_S);
+            stops[from..to].fill(true);
+        }
+    }
+    stops
+}
+
+/// Width of the range of `y` without a hundredth of its values at either end.
+fn spread(y: &[f64]) -> f64 {
+    let mut sorted = y.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let beyond = sorted.len() / 100;
+    sorted[sorted.len() - 1 - beyond] - sorted[beyond]
 }
 
 /// Replaces wild angles by what the velocities say, and wild velocities by what the angles say.
@@ -317,6 +353,24 @@ mod tests {
         let wild = [150, 151, 152, 153, 700, 905, 940, 941];
         wild.iter().for_each(|&k| noise[k] += if k == 941 { -60.0 } else { 60.0 });
         assert_eq!(mended(noise), wild);
+    }
+
+    /// Where a move of the trapezoidal kind ends, friction is gone a row before the deceleration is: of hardly noisy torque
+    /// that is far off. A value that is off as much in the middle of a move is wild, and so is one at a stop that is
+    /// outside the range of all others.
+    #[test]
+    fn peaks_at_a_stop_are_not_wild() {
+        let mended = |off: &[(usize, f64)]| {
+            let mut record = moves_and_rests(4.0, 0.02);
+            off.iter().for_each(|&(row, nm)| record.torque_nm.joint_mut(0)[row] += nm);
+            mend_torque(&mut record).into_iter().flat_map(|stray| stray.rows).collect::<Vec<_>>()
+        };
+        // The torque ranges from −6.5 to 8 Nm. The moves end in rows 500, 1500 and 2500.
+        let at_stops = [(500, -4.0), (1500, -4.0), (2500, -4.0)];
+        assert_eq!(mended(&at_stops), [0; 0]);
+        assert_eq!(mended(&[(300, -4.0), (1300, -4.0), (2300, -4.0)]), [300, 1300, 2300]);
+        let far = at_stops.map(|(row, _)| (row, 40.0));
+        assert_eq!(mended(&far), [500, 1500, 2500]);
     }
 
     /// None of these is wild: stamps that are half a row late, rows that were read that late, an acceleration that

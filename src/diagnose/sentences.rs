@@ -308,6 +308,12 @@ impl Cause {
     fn contact_sentence(&self) -> String {
         let value = |name: &str| self.parameters.get(name).map_or(f64::NAN, |e| e.value);
         let when = format!("From {:.2} s to {:.2} s", value("start_s"), value("end_s"));
+        if self.confidence <= EVEN_ODDS {
+            return format!(
+                "{when} it looks as if {}; something unknown may look like it.",
+                self.in_words
+            );
+        }
         match self.separating_experiment {
             None => format!("{when} {}.", self.in_words),
             Some(experiment) => format!(
@@ -399,6 +405,21 @@ mod tests {
         // A size that may be half or none is still stated with its value.
         assert_eq!(told(0.02, [0.001, 0.039], ""), "0.020 ± 0.019");
         assert_eq!(told(0.02, [-0.001, 0.06], ""), "0.020 (between -0.0010 and 0.060)");
+    }
+
+    /// Where something is unexplained as well, a touch is not stated as a fact.
+    #[test]
+    fn a_touch_at_even_odds_is_said_to_look_like_one() {
+        let estimate = |value| Estimate { value, unit: "s", ci95: [value - 0.1, value + 0.1] };
+        let times = [("start_s", estimate(1.5)), ("end_s", estimate(2.25))];
+        let words = "something touched the arm: joint 2 by +1.6 Nm";
+        let sure = Cause::certain(Kind::Contact, None, words, 20.0, &times);
+        assert_eq!(sure.sentence(true), format!("From 1.50 s to 2.25 s {words}."));
+        let unsure = Cause { confidence: 0.5, ..sure };
+        let said = format!(
+            "From 1.50 s to 2.25 s it looks as if {words}; something unknown may look like it."
+        );
+        assert_eq!(unsure.sentence(true), said);
     }
 
     #[test]

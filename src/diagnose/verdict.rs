@@ -51,6 +51,12 @@ impl Estimate {
         self.ci95 = self.ci95.map(|end| self.value + factor * (end - self.value));
     }
 
+    /// Multiplies the value and its interval by the positive `factor`.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.value *= factor;
+        self.ci95 = self.ci95.map(|end| factor * end);
+    }
+
     /// Moves the value and its interval by `change`.
     pub(super) fn shift(&mut self, change: f64) {
         self.value += change;

@@ -1,8 +1,8 @@
 //! Contacts in a single run: torque that deviates far from the extended model.
 //!
-//! Samples near a joint's own reversals do not count, because errors of the model's friction are largest there. A
-//! contact is where the deviation exceeds [`FAR_OF_MODEL`] robust standard deviations; it lasts while the deviation
-//! stays above the share [`NEAR`] of that.
+//! A contact is where the deviation exceeds [`FAR_OF_MODEL`] robust standard deviations; it lasts while the deviation
+//! stays above the share [`NEAR`] of that. Errors of the model's friction are largest near a joint's own reversals, and
+//! most at a few of these: there the standard deviation is that of the larger errors near reversals.
 
 use std::ops::Range;
 
@@ -24,6 +24,13 @@ const TOGETHER_S: f64 = 0.3;
 /// friction.
 const SLOW_RAD_S: f64 = 0.05;
 const REVERSAL_S: f64 = 0.25;
+/// Share of the samples near reversals whose deviation is called usual. Beyond it may be those of one contact.
+const USUAL: f64 = 0.9;
+/// σ of Gaussian deviations of which the share [`USUAL`] is smaller: 1/1.645.
+const SIGMA_PER_USUAL: f64 = 0.608;
+/// Least number of samples near reversals of which the usual deviation is taken, over the number that one contact of a
+/// second disturbs.
+const SEVERAL: usize = 10;
 
 /// Contacts found beside a model in a single run.
 #[derive(Default)]
@@ -47,29 +54,10 @@ pub fn beside_model(
         return Ok(BesideModel::default());
     }
     let rate_hz = (n - 1) as f64 / (time_s[n - 1] - time_s[0]);
-    let reach = (REVERSAL_S * rate_hz) as usize;
-    let counts: Vec<Vec<bool>> = (0..error_nm.joints())
-        .map(|j| {
-            let mut counts = vec![true; n];
-            for k in (0..n).filter(|&k| qd_rad_s.joint(j)[k].abs() < SLOW_RAD_S) {
-                counts[k.saturating_sub(reach)..=(k + reach).min(n - 1)].fill(false);
-            }
-            counts
-        })
+    let scales: Vec<Scales> = (0..error_nm.joints())
+        .map(|j| Scales::of(error_nm.joint(j), qd_rad_s.joint(j), rate_hz))
         .collect();
-    let sigma_nm: Vec<f64> = counts
-        .iter()
-        .enumerate()
-        .map(|(j, counts)| {
-            let values = error_nm.joint(j).iter().zip(counts);
-            let mut sizes: Vec<f64> = values.filter(|(_, c)| **c).map(|(e, _)| e.abs()).collect();
-            robust_sigma(&mut sizes)
-        })
-        .collect();
-    let score = |j: usize, k: usize| {
-        let is_known = counts[j][k] && sigma_nm[j] > 0.0;
-        if is_known { error_nm.joint(j)[k].abs() / (FAR_OF_MODEL * sigma_nm[j]) } else { 0.0 }
-    };
+    let score = |j: usize, k: usize| error_nm.joint(j)[k].abs() / (FAR_OF_MODEL * scales[j].at(k));
     let joints = 0..error_nm.joints();
     let highest = |k: usize| joints.clone().map(|j| score(j, k)).fold(0.0, f64::max);
     let gap = (TOGETHER_S * rate_hz) as usize;
@@ -84,13 +72,50 @@ pub fn beside_model(
                     scores.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|(.., score)| *score >= 1.0)
                 })
                 .collect();
-            touch(samples, &felt, error_nm, &sigma_nm, time_s, low_pass).transpose()
+            touch(samples, &felt, error_nm, &scales, time_s, low_pass).transpose()
         })
         .collect::<Result<_, _>>()?;
     Ok(BesideModel {
         causes: touches.iter().map(Touch::cause).collect(),
         samples: touches.iter().map(|touch| touch.disturbed(rate_hz, n)).collect(),
     })
+}
+
+/// Usual deviations of one joint's torque from the model.
+struct Scales {
+    /// Whether each sample is near a reversal of the joint, or one of its rests.
+    is_near: Vec<bool>,
+    /// Robust σ far from reversals, and near them, Nm; infinite where it is not known.
+    sigma_nm: [f64; 2],
+}
+
+impl Scales {
+    /// The scales of the deviations `error_nm` of a joint with the velocities `qd_rad_s`.
+    fn of(error_nm: &[f64], qd_rad_s: &[f64], rate_hz: f64) -> Self {
+        let n = error_nm.len();
+        let reach = (REVERSAL_S * rate_hz) as usize;
+        let mut is_near = vec![false; n];
+        for k in (0..n).filter(|&k| qd_rad_s[k].abs() < SLOW_RAD_S) {
+            is_near[k.saturating_sub(reach)..=(k + reach).min(n - 1)].fill(true);
+        }
+        let sizes = |near: bool| -> Vec<f64> {
+            let there = error_nm.iter().zip(&is_near).filter(|(_, is_near)| **is_near == near);
+            there.map(|(error, _)| error.abs()).collect()
+        };
+        let known = |sigma: f64| if sigma > 0.0 { sigma } else { f64::INFINITY };
+        let far_nm = known(robust_sigma(&mut sizes(false)));
+        let mut near = sizes(true);
+        near.sort_by(f64::total_cmp);
+        let is_enough = near.len() as f64 > SEVERAL as f64 * rate_hz;
+        let usual = near.get((USUAL * near.len() as f64) as usize).filter(|_| is_enough);
+        let near_nm = known(usual.map_or(0.0, |usual| SIGMA_PER_USUAL * usual)).max(far_nm);
+        Self { is_near, sigma_nm: [far_nm, near_nm] }
+    }
+
+    /// Robust σ of the deviation at sample `k`, Nm.
+    fn at(&self, k: usize) -> f64 {
+        self.sigma_nm[usize::from(self.is_near[k])]
+    }
 }
 
 /// Stretches of `0..n` that begin and end with a sample that `is_far`, with fewer than `gap` other samples in a row in
@@ -111,7 +136,7 @@ fn touch(
     samples: Range<usize>,
     felt: &[(usize, usize, f64)],
     error_nm: &JointSignals,
-    sigma_nm: &[f64],
+    scales: &[Scales],
     time_s: &[f64],
     low_pass: &ZeroPhase,
 ) -> Result<Option<Touch>, SignalError> {
@@ -120,7 +145,7 @@ fn touch(
     let Some(most) = felt.iter().max_by(|a, b| size(a).total_cmp(&size(b))) else {
         return Ok(None);
     };
-    let (peak_nm, sigma_nm) = (height_nm(most), sigma_nm[most.0]);
+    let (peak_nm, sigma_nm) = (height_nm(most), scales[most.0].at(most.1));
     let score = felt.iter().map(|(.., score)| *score).fold(1.0, f64::max);
     // A low-pass moves an edge by up to a quarter of its shortest period.
     let blur_s = 0.25 / low_pass.cutoff_hz();
@@ -179,6 +204,40 @@ fn kept_of_peak(low_pass: &ZeroPhase, length_s: f64) -> Result<f64, SignalError>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A joint that reverses twice in 5 s, with an error of 0.1 Nm, and of up to 1.5 Nm for 0.2 s at each reversal. A push
+    /// of 0.6 s by 20 Nm around a reversal is a contact of its time and height, and the errors alone are none. σ near
+    /// reversals is 0.9 Nm at most (the errors of 1.5 Nm fill 0.2 s of every 0.5 s there), of which 12 are 11 Nm.
+    #[test]
+    fn a_push_at_a_reversal_is_found() {
+        let (rate_hz, samples) = (125.0, 60 * 125);
+        let low_pass = ZeroPhase::new(10.0, 4, rate_hz).unwrap();
+        let time_s: Vec<f64> = (0..samples).map(|k| k as f64 / rate_hz).collect();
+        let phase = |k: usize| std::f64::consts::TAU * time_s[k] / 5.0;
+        let qd_rad_s = JointSignals::from_fn(1, samples, |_, k| phase(k).sin());
+        let usual = |k: usize| {
+            let since = (time_s[k] % 2.5).min(2.5 - time_s[k] % 2.5);
+            let ripple = 0.1 * (7.3 * k as f64).sin();
+            if since < 0.1 { 1.5 * (1.0 - since / 0.1) + ripple } else { ripple }
+        };
+        let pushed = |k: usize| {
+            let u = (time_s[k] - 29.7) / 0.6;
+            let is_on = (0.0..1.0).contains(&u);
+            if is_on { 20.0 * (std::f64::consts::PI * u).sin().powi(2) } else { 0.0 }
+        };
+        let found = |error: &dyn Fn(usize) -> f64| {
+            let error_nm = JointSignals::from_fn(1, samples, |_, k| error(k));
+            beside_model(&error_nm, &qd_rad_s, &time_s, &low_pass).unwrap().causes
+        };
+        assert!(found(&usual).is_empty());
+        let causes = found(&|k| usual(k) + pushed(k));
+        let [touch] = &causes[..] else { panic!("{causes:?}") };
+        let value = |name: &str| touch.parameters[name].value;
+        // The threshold of 6 σ cuts the feet of the push off; beside them is what the model leaves of the reversal.
+        assert!((29.6..29.95).contains(&value("start_s")), "{touch:?}");
+        assert!((30.05..30.4).contains(&value("end_s")), "{touch:?}");
+        assert!((value("peak_nm") - 20.0).abs() < 3.0, "{touch:?}");
+    }
 
     /// ∫ P(f)/(1 + (√2 − 1)(f/f_c)⁸) df by hand, with P the spectrum of sin². At 125 Hz, a push of a tenth of a second
     /// has its peak a quarter of a sample from the nearest sample, whose value is (π/50)² = 0.004 lower.

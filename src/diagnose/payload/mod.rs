@@ -20,7 +20,7 @@ use serde::Serialize;
 use super::candidates::Candidate;
 use super::chance;
 use super::error::DiagnoseError;
-use super::extension::Extension;
+use super::extension::{Effect, Extension};
 use super::kind::Kind;
 use super::verdict::{Cause, Estimate};
 use crate::base::BaseSet;
@@ -67,6 +67,17 @@ pub(super) struct Shared<'a> {
     pub(super) extension: &'a Extension,
 }
 
+impl Shared<'_> {
+    /// The error e of the torque constant of joint `j` (from 0 on) that the first log tells, as a fraction: the log shows
+    /// (1 + e) times the torque. The scale of its gain is found beside it.
+    fn gain_error(&self, j: usize) -> f64 {
+        let is_gain = |effect: &&Effect| {
+            self.families[effect.family].kind() == Kind::TorqueGain && effect.site == Some(j)
+        };
+        self.extension.effects.iter().filter(is_gain).flat_map(|effect| &effect.coefficients).sum()
+    }
+}
+
 /// Compares the log of the regression `second` with that of `first`; `names` are the names of the two logs.
 pub(super) fn between(
     shared: &Shared,
@@ -79,8 +90,11 @@ pub(super) fn between(
     let (mass_kg, probability) = (fit.mass_kg(), fit.probability());
     let is_named = probability < chance::PAYLOAD && mass_kg.ci95[0] > 0.0;
     let known_kg = known_mass_kg.filter(|_| is_named);
-    let joint_gain_scales =
+    let mut joint_gain_scales =
         known_kg.map(|known| fit.joint_gain_scales(known, names[1])).transpose()?;
+    for (j, scale) in joint_gain_scales.iter_mut().flatten().enumerate() {
+        scale.scale(1.0 / (1.0 + shared.gain_error(j)));
+    }
     Ok(PayloadFinding {
         reference: names[0].to_owned(),
         mass_kg,
