@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::robot::{OtherRobot, SavedRobot};
 use crate::base::BaseSet;
-use crate::report::identify::{CONTRADICTED, IDENTIFY_SCHEMA};
+use crate::report::identify::{CONTRADICTED, IDENTIFY_SCHEMA, NOT_IDENTIFIED};
 use crate::report::saved::{SavedError, load};
 use crate::robot::Arm;
 
@@ -101,6 +101,11 @@ impl EarlierResult {
         } else {
             None
         }
+    }
+
+    /// Whether parameters stay open that its log does not tell.
+    pub(super) fn is_not_identified(&self) -> bool {
+        self.verdict == NOT_IDENTIFIED
     }
 
     /// Whether the result states only σ and no covariance, as results of older versions do.

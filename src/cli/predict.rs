@@ -17,7 +17,7 @@ use crate::identify::{
 };
 use crate::log::{Layout, write_columns};
 use crate::number::significant;
-use crate::output::{OutputError, check_outputs};
+use crate::output::check_outputs;
 use crate::report::identify::Validation;
 use crate::report::{Column, Status, Table};
 use crate::robot::{Arm, JointSignals};
@@ -37,10 +37,10 @@ pub struct PredictArgs {
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// Cut-off of the low-pass on the measured and the predicted torque of a log, Hz [default: 10].
-    #[arg(long = "cutoff", value_name = "HZ")]
+    #[arg(long = "cutoff", value_name = "HZ", allow_negative_numbers = true)]
     cutoff_hz: Option<f64>,
     /// Rate to which a log is resampled, Hz. Default: its own, but logs above 300 Hz are decimated to 150 to 300 Hz.
-    #[arg(long = "rate", value_name = "HZ")]
+    #[arg(long = "rate", value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: Option<f64>,
 }
 
@@ -93,6 +93,9 @@ impl Known {
         let result = EarlierResult::load(path)?;
         result.check(arm).map_err(|other| format!("{name}: {other}"))?;
         let (found, expected) = (result.parameters().len(), set.rank());
+        if found == 0 {
+            return Err(format!("{name}: no base parameters were identified").into());
+        }
         if found != expected {
             return Err(format!(
                 "{name}: it has {found} base parameters, and {} has {expected}: give the robot as it was identified (torque_offsets decides \
@@ -103,7 +106,7 @@ impl Known {
         }
         let places = result.places(set).map_err(|fault| format!("{name}: {fault}"))?;
         let covariance = match result.lacks_covariance() {
-            true => Err("it has σ but no covariance of the base parameters".to_owned()),
+            true => Err("it has no covariance of the base parameters".to_owned()),
             false => result.covariance(&places),
         };
         let unknown = covariance.as_ref().err().map(|why| {
@@ -117,10 +120,13 @@ impl Known {
                 "{name}: the model was wrong along its log: the predicted torque lacks what the model lacks, of which its σ says nothing"
             ),
         });
+        let open = result.is_not_identified().then(|| {
+            format!("{name}: its log does not tell all parameters: torques along other motions may be wrong by more than their σ")
+        });
         Ok(Self {
             theta: result.values(&places),
             covariance: covariance.ok(),
-            notes: unknown.into_iter().chain(doubt).collect(),
+            notes: unknown.into_iter().chain(doubt).chain(open).collect(),
         })
     }
 }
@@ -190,11 +196,20 @@ fn along_motion(
     planned: &PlannedMotion,
     (arm, set): (&Arm, &BaseSet),
     known: &Known,
-) -> Result<(), OutputError> {
+) -> Result<(), Box<dyn std::error::Error>> {
     let PlannedMotion { time_s, motion } = planned;
     let (model, covariance) = (Model::new(arm), known.covariance.as_ref());
     let Forecast { torque_nm, sd_nm } =
         Forecast::along(motion, &model, set, &known.theta, covariance);
+    let is_finite = |j: usize| torque_nm.joint(j).iter().all(|nm| nm.is_finite());
+    if let Some(j) = (0..arm.dof()).find(|j| !is_finite(*j)) {
+        let file = args.log.display();
+        return Err(format!(
+            "{file}: its motion is none of an arm: the torque of joint {} is infinite",
+            j + 1
+        )
+        .into());
+    }
     let blocks = std::iter::once(("predicted_torque", &torque_nm)).chain(of_sd(sd_nm.as_ref()));
     write_columns(&args.out, &columns(time_s, blocks), |_| {})?;
 

@@ -66,6 +66,12 @@ pub struct Faults {
 /// they hide faults of the velocity and the torque. Missing rows are filled in from other periods unless the motion
 /// counts as a `single_run`.
 pub fn find(m: &Measurement, single_run: bool) -> Result<Faults, SignalError> {
+    find_by(m, single_run, 0.0)
+}
+
+/// Like [`find`]; velocities that are late by less than `least_lag_s` are not computed from the angles
+/// ([`Record::undo_lags`]).
+pub fn find_by(m: &Measurement, single_run: bool, least_lag_s: f64) -> Result<Faults, SignalError> {
     let mut out: Vec<Cause> = Vec::new();
     let repeats = repeats(m);
     out.extend(repeated_or_missing(m, &repeats));
@@ -82,7 +88,7 @@ pub fn find(m: &Measurement, single_run: bool) -> Result<Faults, SignalError> {
     let (warning, unreadable) = without_hanging_torques(&mut record, &stale, single_run)?;
     out.extend(stale.causes);
     let lags = velocity_lag(&record.measurement(m.source));
-    record.undo_lags(&lags);
+    record.undo_lags(&lags, least_lag_s);
     out.extend(lags);
     out.extend(wild);
     out.extend(quantisation(m.torque_nm, &record.torque_nm));
@@ -105,7 +111,7 @@ fn without_hanging_torques(
     let filled = |record: &mut Record| if single_run { Ok(None) } else { record.fill_gaps() };
     let rows = stale.hanging_rows();
     if !rows.is_empty() {
-        let mut without = Record::without_rows(&record.measurement(""), &rows);
+        let mut without = record.leave_out(&rows);
         let warning = filled(&mut without)?;
         let is_long = rows.len() as f64 > SHORT_HANG * record.time_s.len() as f64;
         if is_long || !without.filled.is_empty() {

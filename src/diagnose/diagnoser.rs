@@ -277,7 +277,7 @@ fn gain_along(
     log.measurement.require_rows()?;
     // The recorder has the same lags on other days.
     let mut record = Record::without_rows(&log.measurement, &[]);
-    record.undo_lags(causes);
+    record.undo_lags(causes, 0.0);
     let measurement = record.measurement(log.measurement.source);
     let log = &Validation { measurement, manufacturer_nm: log.manufacturer_nm };
     held_out_gain(identifier, sources, drive_gain_nm_a, families, log, models)

@@ -63,6 +63,8 @@ pub struct Record {
     pub torque_nm: JointSignals,
     /// Gaps that were filled with rows of other periods.
     pub filled: Vec<Gap>,
+    /// The row of the log that each row is; empty where gaps were filled.
+    pub rows: Vec<usize>,
 }
 
 impl Record {
@@ -79,7 +81,15 @@ impl Record {
             qd_rad_s: of(m.qd_rad_s),
             torque_nm: of(m.torque_nm),
             filled: Vec::new(),
+            rows,
         }
+    }
+
+    /// The record without the rows `left_out` of its own, which are in ascending order.
+    pub fn leave_out(&self, left_out: &[usize]) -> Self {
+        let less = Self::without_rows(&self.measurement(""), left_out);
+        let rows = less.rows.iter().map(|k| self.rows[*k]).collect();
+        Self { rows, ..less }
     }
 
     /// A view of the record as a measurement from `source`.
@@ -90,6 +100,21 @@ impl Record {
             q_rad: &self.q_rad,
             qd_rad_s: &self.qd_rad_s,
             torque_nm: &self.torque_nm,
+        }
+    }
+
+    /// Sets row `to` to what `at` reads from every channel of `other`.
+    pub fn set_row(&mut self, to: usize, other: &Self, at: impl Fn(&[f64]) -> f64) {
+        self.time_s[to] = at(&other.time_s);
+        let channels = [
+            (&mut self.q_rad, &other.q_rad),
+            (&mut self.qd_rad_s, &other.qd_rad_s),
+            (&mut self.torque_nm, &other.torque_nm),
+        ];
+        for (own, other) in channels {
+            for j in 0..other.joints() {
+                own.joint_mut(j)[to] = at(other.joint(j));
+            }
         }
     }
 
@@ -108,29 +133,30 @@ impl Record {
         };
         let warning = filled.warning();
         let Filled { time_s, q_rad, qd_rad_s, torque_nm, gaps } = filled;
-        *self = Self { time_s, q_rad, qd_rad_s, torque_nm, filled: gaps };
+        *self = Self { time_s, q_rad, qd_rad_s, torque_nm, filled: gaps, rows: Vec::new() };
         Ok(Some(warning))
     }
 
-    /// Undoes the velocity lags among `causes`.
-    pub fn undo_lags(&mut self, causes: &[Cause]) {
+    /// Undoes the velocity lags among `causes`. Velocities that are late by less than `least_s` are moved in any case.
+    pub fn undo_lags(&mut self, causes: &[Cause], least_s: f64) {
         for lag in causes.iter().filter(|cause| cause.kind == Kind::VelocityLag) {
-            self.undo_lag(lag.joint.map(|j| j - 1), lag.parameters["delay_s"].value);
+            self.undo_lag(lag.joint.map(|j| j - 1), lag.parameters["delay_s"].value, least_s);
         }
     }
 
     /// Undoes a lag by which the velocity of `joint` (`None`: of all joints) came `lag_s` late.
     ///
     /// Where rows are evenly spaced, the velocity is computed from the angles, because what makes a velocity late is
-    /// usually a filter, which also rounds the kinks at which friction is tested. Elsewhere the late velocity is moved,
-    /// linearly between its samples.
-    fn undo_lag(&mut self, joint: Option<usize>, lag_s: f64) {
+    /// usually a filter, which also rounds the kinks at which friction is tested. Elsewhere, and if it is late by less than
+    /// `least_s`, the late velocity is moved, linearly between its samples.
+    fn undo_lag(&mut self, joint: Option<usize>, lag_s: f64, least_s: f64) {
         let t = &self.time_s;
         for j in joint.map_or(0..self.qd_rad_s.joints(), |j| j..j + 1) {
             let late = self.qd_rad_s.joint(j).to_vec();
             let q = self.q_rad.joint(j);
             for (k, value) in self.qd_rad_s.joint_mut(j).iter_mut().enumerate() {
-                *value = slope(t, q, k).unwrap_or_else(|| {
+                let slope = slope(t, q, k).filter(|_| lag_s.abs() >= least_s);
+                *value = slope.unwrap_or_else(|| {
                     let at = t[k] + lag_s;
                     let right = t.partition_point(|s| *s < at).clamp(1, t.len() - 1);
                     let u = ((at - t[right - 1]) / (t[right] - t[right - 1])).clamp(0.0, 1.0);
@@ -160,7 +186,8 @@ pub fn moves_and_rests(moves_s: f64, noise_nm: f64) -> Record {
     let qd_rad_s = of(&|p| if p < TAU { speed * p.sin() } else { 0.0 });
     let clean = of(&|p| 8.0 * (0.7 * p).cos());
     let torque_nm = clean.map_joints(|_, y| y.iter().map(|y| y + noise_nm * noise()).collect());
-    Record { time_s, q_rad, qd_rad_s, torque_nm, filled: Vec::new() }
+    let rows = (0..samples).collect();
+    Record { time_s, q_rad, qd_rad_s, torque_nm, filled: Vec::new(), rows }
 }
 
 #[cfg(test)]

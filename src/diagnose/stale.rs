@@ -114,7 +114,7 @@ pub fn mend(record: &mut Record) -> StaleReadings {
             interpolate(time_s, torque_nm, stale.joint, torque);
         }
     } else if !left_out.is_empty() {
-        *record = Record::without_rows(&record.measurement(""), &left_out);
+        *record = record.leave_out(&left_out);
     }
     let causes = causes(&found, samples);
     let is_left = |k: &usize| left_out.binary_search(k).is_err();

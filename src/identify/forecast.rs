@@ -87,7 +87,7 @@ fn write_sd(
         out.iter_mut().zip(&*scratch).zip(of_a).for_each(|((square, sum), x)| *square += sum * x);
     }
     // A variance of zero may come out below it by rounding.
-    out.iter_mut().for_each(|square| *square = square.max(0.0).sqrt());
+    out.iter_mut().for_each(|square| *square = if *square < 0.0 { 0.0 } else { square.sqrt() });
 }
 
 #[cfg(test)]

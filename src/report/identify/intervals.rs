@@ -172,7 +172,7 @@ impl Intervals {
             let whence = match Lowered::in_words(lowered) {
                 None => "; armid diagnose looks for its cause.".to_owned(),
                 Some(lowered) => format!(
-                    ". {lowered}, which alone can be its cause: leave that out before armid diagnose looks for another."
+                    ". {lowered}, which can be the whole cause: leave that out before armid diagnose looks for another."
                 ),
             };
             format!(

@@ -38,7 +38,8 @@ pub const IDENTIFY_SCHEMA: &str = "armid.identify/1";
 const FEW_DEGREES_OF_FREEDOM: f64 = 10.0;
 
 const IDENTIFIED: &str = "identified";
-const NOT_IDENTIFIED: &str = "not_identified";
+/// Verdict on a log that leaves parameters open.
+pub const NOT_IDENTIFIED: &str = "not_identified";
 /// Verdict if no arm can have the identified parameters, or if the log fits only when its channels are read
 /// differently.
 pub const CONTRADICTED: &str = "contradicted";
