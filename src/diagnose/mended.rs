@@ -3,7 +3,6 @@
 
 use super::data_faults::{Faults, MISSING, find_by, step_s};
 use super::kind::Kind;
-use super::outliers;
 use super::record::Record;
 use super::verdict::Cause;
 use crate::identify::Measurement;
@@ -33,23 +32,26 @@ impl Mended {
     /// [`SignalError`] if the signals cannot be processed.
     pub fn of(m: &Measurement) -> Result<Self, SignalError> {
         // As along a single run, nothing is filled in.
-        let Faults { causes, record, .. } = find_by(m, true, SHORT_LAG * step_s(m))?;
+        let Faults { causes, record, warnings, .. } = find_by(m, true, SHORT_LAG * step_s(m))?;
         let mut all = Record::without_rows(m, &[]);
-        let wild = outliers::mend(&mut all);
         let is_whole = put_back(&record, &mut all);
         let is_told = |fault: &&Cause| match fault.kind {
-            Kind::Outliers | Kind::VelocityLag => false,
+            Kind::VelocityLag => false,
             // Rows that are missing are told where the log is prepared.
             Kind::DroppedSamples => fault.in_words != MISSING,
             _ => true,
         };
         let of_fault = |fault: &Cause| {
-            let is_corrected = is_whole && fault.kind != Kind::Quantisation;
+            let is_corrected = match fault.kind {
+                Kind::Quantisation => false,
+                Kind::Outliers => true,
+                _ => is_whole,
+            };
             format!("{} {}", fault.sentence(false), if is_corrected { CORRECTED } else { STAYS })
         };
         let is_lag = |fault: &&Cause| fault.kind == Kind::VelocityLag;
         let lags: Vec<&Cause> = causes.iter().filter(is_lag).collect();
-        let remarks = wild.iter().map(|few| few.in_words(m.time_s)).chain(of_lags(&lags));
+        let remarks = warnings.into_iter().chain(of_lags(&lags));
         let remarks = remarks.chain(causes.iter().filter(is_told).map(of_fault)).collect();
         let Record { time_s, q_rad, qd_rad_s, torque_nm, .. } = all;
         Ok(Self { time_s, channels: [q_rad, qd_rad_s, torque_nm], remarks })

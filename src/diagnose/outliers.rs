@@ -55,7 +55,7 @@ impl Strays {
         self.rows.len() >= FEWEST
     }
 
-    pub(super) fn in_words(&self, time_s: &[f64]) -> String {
+    fn in_words(&self, time_s: &[f64]) -> String {
         let Self { joint, channel, rows } = self;
         let first_s = rows.first().and_then(|row| time_s.get(*row)).unwrap_or(&0.0);
         let values = if rows.len() == 1 { "value" } else { "values" };
