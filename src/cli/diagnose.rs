@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::identify::{LoadedLog, ProcessingArgs, RowsOf, SourceArgs, read_logs};
+use super::identify::{ProcessingArgs, SourceArgs};
+use super::loaded_log::{LoadedLog, RowsOf, read_logs};
 use super::simulated::Simulated;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};

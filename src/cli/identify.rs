@@ -1,16 +1,14 @@
 //! `armid identify`: estimates parameters and their uncertainty from logs of a real or simulated arm.
 
-use std::collections::HashSet;
-use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 
+use super::loaded_log::{LoadedLog, RowsOf, read_logs};
 use super::robot::{inputs, load_robot};
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
-use crate::diagnose::Mended;
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalError, PhysicalOptions, PriorMetric, PriorWeight};
@@ -18,7 +16,7 @@ use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Improper, Measurement,
     Misreading, Options, Processing, Regression, SeveralLogs,
 };
-use crate::log::{Layout, Log, read_log};
+use crate::log::{Layout, Log};
 use crate::output::check_outputs;
 use crate::report::identify::{
     Declined, IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, facts, page,
@@ -27,7 +25,7 @@ use crate::report::identify::{
 use crate::report::json::{Document, Input, Program};
 use crate::report::misread::MisreadLog;
 use crate::report::{Page, ReportError};
-use crate::robot::{Arm, JointSignals, LoadedArm};
+use crate::robot::{Arm, LoadedArm};
 
 /// Identify the base parameters of an arm from logs of its motion.
 #[derive(Debug, Args)]
@@ -130,104 +128,6 @@ pub fn checked(options: Options) -> Result<Options, String> {
     }
 }
 
-/// A log with its torque in Nm.
-pub struct LoadedLog {
-    /// The log.
-    pub log: Log,
-    /// Drive torque at the joint, Nm.
-    pub torque_nm: JointSignals,
-    /// The file the log was read from.
-    pub input: Input,
-    /// Remarks on faults of the record.
-    pub mended: Vec<String>,
-}
-
-impl LoadedLog {
-    /// Reads a log and prints how many of its rows were used or set aside.
-    pub fn read(
-        file: &Path,
-        arm: &Arm,
-        layout: &Layout,
-    ) -> Result<Self, Box<dyn std::error::Error>> {
-        let mut log = read_log(file, layout, arm.dof())?;
-        log.warn_of_assumed_gains(arm);
-        eprintln!("{}:\n{}", file.display(), log.rows);
-        let torque_nm = log.torque_nm(arm)?;
-        let input = Input { path: file.to_owned(), sha256: log.sha256.clone() };
-        Ok(Self { log, torque_nm, input, mended: Vec::new() })
-    }
-
-    /// The channels that identification needs.
-    pub fn measurement(&self) -> Measurement<'_> {
-        Measurement {
-            source: &self.log.source,
-            time_s: &self.log.time_s,
-            q_rad: &self.log.q_rad,
-            qd_rad_s: &self.log.qd_rad_s,
-            torque_nm: &self.torque_nm,
-        }
-    }
-}
-
-/// Share of common rows above which two logs count as the same: at rest, and with rounded readings, some rows coincide
-/// by chance.
-const SAME: f64 = 0.5;
-
-impl LoadedLog {
-    /// Corrects what can be corrected within its rows, and remarks on every other fault of the record. Logs that cannot be
-    /// processed are left to the identification, which says why.
-    pub fn mend(&mut self) {
-        let Ok(Mended { time_s, channels, remarks }) = Mended::of(&self.measurement()) else {
-            return;
-        };
-        self.log.time_s = time_s;
-        [self.log.q_rad, self.log.qd_rad_s, self.torque_nm] = channels;
-        let of_log = |remark| format!("{}: {remark}", self.log.source);
-        self.mended = remarks.into_iter().map(of_log).collect();
-    }
-
-    /// How the log has to be read, if not as it was.
-    pub fn misreading(
-        &self,
-        arm: &Arm,
-        regression: &Regression,
-        options: &Options,
-    ) -> Option<Misreading> {
-        let gain = self.log.drive_gain_nm_a(arm);
-        Misreading::of(arm, regression, options, gain.as_deref())
-    }
-
-    /// What tells its recording from others.
-    pub fn rows(&self) -> RowsOf<'_> {
-        let channels = [&self.log.q_rad, &self.log.qd_rad_s, &self.torque_nm];
-        let joints = channels.into_iter().flat_map(|y| (0..y.joints()).map(|j| y.joint(j)));
-        let joints: Vec<&[f64]> = joints.collect();
-        let row = |k: usize| {
-            let mut hasher = DefaultHasher::new();
-            joints.iter().for_each(|y| y[k].to_bits().hash(&mut hasher));
-            hasher.finish()
-        };
-        let hashes: Vec<u64> = (0..self.log.time_s.len()).map(row).collect();
-        RowsOf { log: self, known: hashes.iter().copied().collect(), hashes }
-    }
-}
-
-/// Hashes of the rows of a log.
-pub struct RowsOf<'a> {
-    /// The log.
-    pub log: &'a LoadedLog,
-    hashes: Vec<u64>,
-    known: HashSet<u64>,
-}
-
-impl RowsOf<'_> {
-    /// Whether these are rows of the same recording as those of `other`, or one is a part of the other.
-    pub fn are_of(&self, other: &Self) -> bool {
-        let common = self.hashes.iter().filter(|row| other.known.contains(row)).count();
-        common as f64 > SAME * self.hashes.len().min(other.hashes.len()) as f64
-    }
-}
-
 impl SourceArgs {
     /// The arm, the layout of its logs, and the files that describe both. Prints the assumptions about the arm.
     pub fn load(&self) -> Result<(Arm, Layout, Vec<Input>), Box<dyn std::error::Error>> {
@@ -236,15 +136,6 @@ impl SourceArgs {
         files.extend(layout.files());
         Ok((arm, layout, inputs(&files)?))
     }
-}
-
-/// Reads logs and prints how many rows of each were used or set aside ([`LoadedLog::read`]).
-pub fn read_logs(
-    files: &[PathBuf],
-    arm: &Arm,
-    layout: &Layout,
-) -> Result<Vec<LoadedLog>, Box<dyn std::error::Error>> {
-    files.iter().map(|file| LoadedLog::read(file, arm, layout)).collect()
 }
 
 /// What the command reads.

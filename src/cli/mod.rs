@@ -19,6 +19,7 @@ mod earlier;
 pub mod excite;
 pub mod export;
 pub mod identify;
+mod loaded_log;
 pub mod montecarlo;
 mod outputs;
 pub mod predict;

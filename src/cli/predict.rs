@@ -6,7 +6,8 @@ use clap::Args;
 use nalgebra::DMatrix;
 
 use super::earlier::{Doubt, EarlierResult};
-use super::identify::{LoadedLog, SourceArgs, checked};
+use super::identify::{SourceArgs, checked};
+use super::loaded_log::LoadedLog;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::dot::dot;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::identify::{LoadedLog, read_logs};
+use super::loaded_log::LoadedLog;
 use super::robot::load_robot;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
@@ -71,10 +71,7 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
     let [controllers, authors] = [Layout::load(LAYOUTS[0])?, Layout::load(LAYOUTS[1])?];
     let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let model = Model::new(&arm);
-    let read = |layout: &Layout, file: &str| -> Result<LoadedLog, Box<dyn std::error::Error>> {
-        let mut logs = read_logs(&[folder.join(file)], &arm, layout)?;
-        logs.pop().ok_or_else(|| format!("{file}: not read").into())
-    };
+    let read = |layout: &Layout, file: &str| LoadedLog::read(&folder.join(file), &arm, layout);
     let mut diagnoser = Diagnoser::new(&arm, &model, &set, Options::default());
 
     let training = read(&controllers, TRAINING)?;
