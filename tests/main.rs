@@ -12,6 +12,7 @@ mod simulated;
 mod blind_benchmark;
 mod blind_changes;
 mod blind_families;
+mod blind_moves;
 mod blind_records;
 mod blind_single_runs;
 mod cli_diagnose;

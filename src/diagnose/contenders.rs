@@ -29,9 +29,9 @@ const BETWEEN_SHAPES: f64 = 0.8;
 pub struct Contender {
     /// Family, site, shape and columns.
     pub entry: Entry,
-    /// What it explains.
+    /// What it explains beside the causes that were there when it was scored: of a cause, at its last refinement.
     pub score: Score,
-    /// Twice the log-evidence for it against no effect.
+    /// Twice the log-evidence for it against no effect, beside the same causes.
     pub evidence: f64,
 }
 
@@ -175,8 +175,8 @@ impl Kept<'_, '_> {
         Some(Contender { entry: entry.clone(), score, evidence })
     }
 
-    /// Cause `c` as it is now, beside `others`, outside which the `residual` is. Its own score is that of its choice: what
-    /// was found, refined or dropped since changes it.
+    /// Cause `c` as it is now, beside `others`, outside which the `residual` is. Its own score is that of its last
+    /// refinement: what was found, refined or dropped since changes it.
     pub(super) fn beside(&self, c: usize, others: &Span, residual: &Image) -> Option<Contender> {
         self.scored(&self.causes[c].entry, others, residual)
     }

@@ -10,6 +10,7 @@
 use super::kind::Kind;
 use super::outliers;
 use super::record::Record;
+use super::record_fault::RecordFault;
 use super::stale::{self, StaleReadings};
 use super::stalls::stalls;
 use super::verdict::{Cause, Estimate};
@@ -44,11 +45,6 @@ const GO_TOGETHER: f64 = 0.5;
 pub(super) const MOVES_RAD_S: f64 = 0.01;
 /// Share of rows that an ordinary recorder misses; this is not reported.
 const MISSED: f64 = 2e-3;
-/// What is said of rows that are missing, and of rows that repeat the one before in all channels of the arm or of one
-/// joint. By these words the replay knows them.
-pub(super) const MISSING: &str = "samples that are missing";
-/// See [`MISSING`].
-pub(super) const REPEATED: &str = "samples that repeat the one before";
 
 /// The faults of a record.
 pub struct Faults {
@@ -136,7 +132,6 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
     let is_late = |&(lag, sigma): &(f64, f64)| {
         lag.abs() > SMALL_LAG_SAMPLES * step_s && lag.abs() > LAG_T * sigma
     };
-    let words = "a velocity that lags behind the angle";
     let estimate = |lag: f64, sigma: f64| {
         let reach = quantile_95((BLOCKS - 1) as f64) * sigma;
         [("delay_s", Estimate { value: lag, unit: "s", ci95: [lag - reach, lag + reach] })]
@@ -152,10 +147,9 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
         if alike {
             // What the means over four steps do to one joint they do to all.
             let sigma = weight.powf(-0.5).max(LEAST_SIGMA_SAMPLES * step_s);
-            return vec![Cause::certain(
-                Kind::VelocityLag,
+            return vec![Cause::of_the_record(
+                RecordFault::LateVelocity,
                 None,
-                words,
                 mean.abs() / sigma,
                 &estimate(mean, sigma),
             )];
@@ -165,10 +159,9 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
         .enumerate()
         .filter_map(|(j, lag)| {
             let (lag, sigma) = lag.filter(is_late)?;
-            Some(Cause::certain(
-                Kind::VelocityLag,
+            Some(Cause::of_the_record(
+                RecordFault::LateVelocity,
                 Some(j),
-                words,
                 lag.abs() / sigma,
                 &estimate(lag, sigma),
             ))
@@ -235,13 +228,13 @@ fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     let share = |rows: f64| rows / (missing + m.time_s.len() as f64);
     let fraction = share(missing + repeated);
     (fraction > MISSED).then(|| {
-        let words = match [missing, repeated].map(|rows| share(rows) > MISSED) {
-            [true, false] => MISSING,
-            [false, true] => REPEATED,
-            _ => "samples that are missing or repeat the one before",
+        let fault = match [missing, repeated].map(|rows| share(rows) > MISSED) {
+            [true, false] => RecordFault::MissingRows,
+            [false, true] => RecordFault::RepeatedRows,
+            _ => RecordFault::MissingOrRepeatedRows,
         };
         let parameters = [("fraction", Estimate::exact(fraction, ""))];
-        Cause::certain(Kind::DroppedSamples, None, words, f64::INFINITY, &parameters)
+        Cause::of_the_record(fault, None, f64::INFINITY, &parameters)
     })
 }
 
@@ -265,8 +258,7 @@ fn quantisation(recorded: &JointSignals, mended: &JointSignals) -> Vec<Cause> {
         let rms = (changes.iter().map(|c| c * c).sum::<f64>() / changes.len() as f64).sqrt();
         (step > COARSE * rms).then(|| {
             let parameters = [("step", Estimate::exact(step, "Nm"))];
-            let words = "torque in coarse steps";
-            Cause::certain(Kind::Quantisation, Some(j), words, step / rms, &parameters)
+            Cause::of_the_record(RecordFault::CoarseTorque, Some(j), step / rms, &parameters)
         })
     };
     (0..recorded.joints()).filter_map(of_joint).collect()
@@ -466,7 +458,7 @@ mod tests {
         let twice = signals.map(|s| JointSignals::from_fn(2, 4000, |j, k| s.joint(j)[of(k)]));
         let Faults { causes, record, .. } = find_in(&time_s, &twice);
         assert_eq!(causes.iter().map(|f| f.kind).collect::<Vec<_>>(), [Kind::DroppedSamples]);
-        assert_eq!(causes[0].in_words, REPEATED);
+        assert_eq!(causes[0].record_fault, Some(RecordFault::RepeatedRows));
         // Copies cannot be recognised where the arm is at rest.
         assert!((3960..3970).contains(&record.time_s.len()), "{}", record.time_s.len());
     }
@@ -475,7 +467,7 @@ mod tests {
     #[test]
     fn missing_rows_are_told_from_copies() {
         let (time_s, signals) = record(0.0, None);
-        let words = |is_missing: fn(usize) -> bool, is_copy: fn(usize) -> bool| {
+        let fault = |is_missing: fn(usize) -> bool, is_copy: fn(usize) -> bool| {
             let rows: Vec<usize> = (0..4000).filter(|k| !is_missing(*k)).collect();
             let time_s: Vec<f64> = rows.iter().map(|k| time_s[*k]).collect();
             let of = |k: usize| if is_copy(rows[k]) { rows[k] - 1 } else { rows[k] };
@@ -483,12 +475,12 @@ mod tests {
                 .each_ref()
                 .map(|s| JointSignals::from_fn(2, rows.len(), |j, k| s.joint(j)[of(k)]));
             let m = Measurement { source: "test", time_s: &time_s, q_rad, qd_rad_s, torque_nm };
-            repeated_or_missing(&m, &repeats(&m)).unwrap().in_words
+            repeated_or_missing(&m, &repeats(&m)).unwrap().record_fault.unwrap()
         };
         let is_hundredth = |k: usize| k % 100 == 99;
-        assert_eq!(words(is_hundredth, |_| false), MISSING);
-        assert_eq!(words(|_| false, is_hundredth), REPEATED);
-        let both = words(|k| k % 200 == 99, |k| k % 200 == 199);
-        assert_eq!(both, "samples that are missing or repeat the one before");
+        assert_eq!(fault(is_hundredth, |_| false), RecordFault::MissingRows);
+        assert_eq!(fault(|_| false, is_hundredth), RecordFault::RepeatedRows);
+        let both = fault(|k| k % 200 == 99, |k| k % 200 == 199);
+        assert_eq!(both, RecordFault::MissingOrRepeatedRows);
     }
 }

@@ -25,6 +25,7 @@ use super::replay::measured_nm;
 use super::rms::rms_where;
 use super::sentences::Besides;
 use super::settled::{beside_model, residual};
+use super::setup::Setup;
 use super::study::Study;
 use super::verdict::{Cause, Diagnosis, HeldOut, Rms, Verdict};
 use crate::base::BaseSet;
@@ -87,9 +88,9 @@ impl<'a> Diagnoser<'a> {
         move_to_common_motion(&mut regression, (self.arm, self.set), &identification.fit.theta);
 
         // What explains it.
-        let sources = (self.arm, self.set, &self.options);
+        let setup = Setup { arm: self.arm, set: self.set, options: &self.options };
         let explanation =
-            Explanation::of(&self.families, sources, &regression, &identification, &log, m.source)?;
+            Explanation::of(&self.families, setup, &regression, &identification, &log, m.source)?;
         let Explanation { study, null, .. } = &explanation;
         let kept = explanation.kept();
         let selected = kept.selected();
@@ -127,7 +128,7 @@ impl<'a> Diagnoser<'a> {
         let gain = |log| {
             let parts = (&mut self.identifier, &*self.families);
             let currents = self.drive_gain_nm_a.as_deref();
-            gain_along(parts, sources, currents, log, &models, &causes)
+            gain_along(parts, setup, currents, log, &models, &causes)
         };
         let held_out = held_out.iter().map(gain).collect::<Result<Vec<_>, _>>()?;
 
@@ -152,11 +153,7 @@ impl<'a> Diagnoser<'a> {
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
             noise_of_mean_nm: noise_of_mean(&regression).as_ref().map(rms),
             before: Rms { rms_nm: before_rms_nm },
-            verdict: match (&unexplained, causes.is_empty()) {
-                (Some(_), _) => Verdict::Unexplained,
-                (None, true) => Verdict::NothingFound,
-                (None, false) => Verdict::CauseNamed,
-            },
+            verdict: Verdict::of(&causes, unexplained.is_some()),
             causes,
             unexplained,
             form_error,
@@ -224,9 +221,7 @@ impl<'a> Diagnoser<'a> {
         let [(reference_rows, _), (loaded_rows, touched)] = [cleaned(reference)?, cleaned(loaded)?];
         self.refuse_misread(&loaded_rows, loaded.source)?;
         let shared = payload::Shared {
-            arm: self.arm,
-            set: self.set,
-            options: &self.options,
+            setup: Setup { arm: self.arm, set: self.set, options: &self.options },
             families: &self.families,
             extension: &finding.extension,
         };
@@ -268,7 +263,7 @@ fn touches(
 /// Gain of the extended model over the null model along another `log`.
 fn gain_along(
     (identifier, families): (&mut Identifier, &[Box<dyn Candidate>]),
-    sources: (&Arm, &BaseSet, &Options),
+    setup: Setup,
     drive_gain_nm_a: Option<&[f64]>,
     log: &Validation,
     models: &Models,
@@ -280,7 +275,7 @@ fn gain_along(
     record.undo_lags(causes, 0.0);
     let measurement = record.measurement(log.measurement.source);
     let log = &Validation { measurement, manufacturer_nm: log.manufacturer_nm };
-    held_out_gain(identifier, sources, drive_gain_nm_a, families, log, models)
+    held_out_gain(identifier, setup, drive_gain_nm_a, families, log, models)
 }
 
 /// The remarks on held-out logs, each with the name of its log.

@@ -226,6 +226,7 @@ mod tests {
     use crate::base::{BaseSet, Parameterisation};
     use crate::diagnose::candidates;
     use crate::diagnose::load::rigid_torque_along;
+    use crate::diagnose::setup::Setup;
     use crate::dynamics::{Model, Motion};
     use crate::identify::{Identifier, Measurement, Options};
     use crate::robot::{Arm, JointSignals};
@@ -288,7 +289,8 @@ mod tests {
         let fit = identifier.identify_regression(&regression).unwrap().fit;
         let families = candidates::all();
         let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
-        let study = Study::new(&families, (&arm, &set, &options), &regression, estimate, "log");
+        let setup = Setup { arm: &arm, set: &set, options: &options };
+        let study = Study::new(&families, setup, &regression, estimate, "log");
         let mut study = study.unwrap();
         study.look_everywhere();
         let is_sum =

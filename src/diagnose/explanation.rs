@@ -7,10 +7,9 @@ use super::error::DiagnoseError;
 use super::extension::Extension;
 use super::selection::{Kept, select};
 use super::settled::{as_told, is_told_of_others, settled, without_contacts};
+use super::setup::Setup;
 use super::study::Study;
-use crate::base::BaseSet;
-use crate::identify::{Identification, Options, Regression, resting_joints};
-use crate::robot::Arm;
+use crate::identify::{Identification, Regression, resting_joints};
 
 /// What explains a log.
 pub(super) struct Explanation<'a> {
@@ -28,14 +27,14 @@ impl<'a> Explanation<'a> {
     /// periods.
     pub fn of(
         families: &'a [Box<dyn Candidate>],
-        sources: (&Arm, &BaseSet, &Options),
+        setup: Setup,
         regression: &'a Regression,
         identification: &Identification,
         log: &Cleaned,
         source: &str,
     ) -> Result<Self, DiagnoseError> {
         let (mut study, found) =
-            causes_of(families, sources, regression, identification, log, source)?;
+            causes_of(families, setup, regression, identification, log, source)?;
         let null = Extension::fit(&study, &[], &study.torque);
         let mut kept = match study.scene.periodic {
             true => Kept::of(&study, found),
@@ -62,15 +61,15 @@ impl<'a> Explanation<'a> {
 /// The study of a log, and the causes that settle with the estimate of its arm.
 fn causes_of<'a>(
     families: &'a [Box<dyn Candidate>],
-    sources: (&Arm, &BaseSet, &Options),
+    setup: Setup,
     regression: &'a Regression,
     identification: &Identification,
     log: &Cleaned,
     source: &str,
 ) -> Result<(Study<'a>, Vec<Contender>), DiagnoseError> {
-    let (arm, set, _) = sources;
+    let Setup { arm, set, .. } = setup;
     let estimate = (&identification.fit.theta[..], &identification.fit.joint_sigma_nm[..]);
-    let mut first = Study::new(families, sources, regression, estimate, source)?;
+    let mut first = Study::new(families, setup, regression, estimate, source)?;
     first.leave_out(log.unreadable.clone());
     first.resting = resting_joints(&regression.prepared.motion.qd_rad_s);
     let null = Extension::fit(&first, &[], &first.torque);

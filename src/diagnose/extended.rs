@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::against::{self, Found, Nominal};
+use super::against::{self, AcceptedEffect, Nominal};
 use super::diagnoser::Diagnoser;
 use super::extension::{Effect, Extension, width_of_arm};
 use super::image::{Image, Span};
@@ -55,12 +55,10 @@ impl Diagnoser<'_> {
     /// needless are dropped, and the others judged anew without them.
     pub(super) fn compare(&self, study: &Study, simulation: Nominal, model: &mut Extended) {
         let found =
-            model.selected.iter().zip(&model.extension.effects).map(|(selected, effect)| Found {
-                entry: &selected.contender.entry,
-                effect,
-                alike: selected.alike(),
+            model.selected.iter().zip(&model.extension.effects).map(|(selected, effect)| {
+                AcceptedEffect { entry: &selected.contender.entry, effect, alike: selected.alike() }
             });
-        let found: Vec<Found> = found.collect();
+        let found: Vec<AcceptedEffect> = found.collect();
         let fitted_nm = fitted(study, &model.extension);
         let sources = (self.arm, self.set);
         let explained = against::explain(study, sources, simulation, &found, &fitted_nm);
@@ -136,6 +134,7 @@ impl Diagnoser<'_> {
             class,
             strength: selected.contender.score.lambda.max(0.0).sqrt(),
             in_words: family.in_words_of(coefficients).to_owned(),
+            record_fault: None,
             form: family.form(&study.scene, *shape),
             may_be_none,
             rivals: rivals.collect(),

@@ -12,14 +12,13 @@ use super::error::DiagnoseError;
 use super::extension::Extension;
 use super::image::{Image, Span};
 use super::rms::rms_where;
+use super::setup::Setup;
 use super::verdict::HeldOut;
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
 use crate::dynamics::Parameter;
-use crate::identify::{
-    Identifier, MOVING_RAD_S, Measurement, Misreading, Options, Problem, Regression,
-};
-use crate::robot::{Arm, JointSignals};
+use crate::identify::{Identifier, MOVING_RAD_S, Measurement, Misreading, Problem, Regression};
+use crate::robot::JointSignals;
 use crate::signal::mean_period;
 
 /// A log that no model has seen, to measure gains on.
@@ -42,7 +41,7 @@ pub(super) struct Models<'a> {
 /// has seen.
 pub(super) fn held_out_gain(
     identifier: &mut Identifier,
-    (arm, set, options): (&Arm, &BaseSet, &Options),
+    Setup { arm, set, options }: Setup,
     drive_gain_nm_a: Option<&[f64]>,
     families: &[Box<dyn Candidate>],
     log: &Validation,

@@ -1,9 +1,10 @@
 //! A log for identification: what can be corrected within its rows is corrected, and every other fault of the record is
 //! told.
 
-use super::data_faults::{Faults, MISSING, find_by, step_s};
+use super::data_faults::{Faults, find_by, step_s};
 use super::kind::Kind;
 use super::record::Record;
+use super::record_fault::RecordFault;
 use super::verdict::Cause;
 use crate::identify::Measurement;
 use crate::robot::JointSignals;
@@ -38,7 +39,7 @@ impl Mended {
         let is_told = |fault: &&Cause| match fault.kind {
             Kind::VelocityLag => false,
             // Rows that are missing are told where the log is prepared.
-            Kind::DroppedSamples => fault.in_words != MISSING,
+            Kind::DroppedSamples => fault.record_fault != Some(RecordFault::MissingRows),
             _ => true,
         };
         let of_fault = |fault: &Cause| {

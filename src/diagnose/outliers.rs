@@ -8,9 +8,10 @@
 
 use rayon::prelude::*;
 
+use super::channel::Channel;
 use super::data_faults::{FAR, MOVES_RAD_S, step_s};
-use super::kind::Kind;
 use super::record::Record;
+use super::record_fault::RecordFault;
 use super::verdict::{Cause, Estimate};
 use crate::median::{median, sigma_of_changes};
 use crate::robot::JointSignals;
@@ -45,7 +46,7 @@ const STOPS_S: f64 = 0.1;
 pub struct Strays {
     /// Joint (0-based).
     joint: usize,
-    channel: &'static str,
+    channel: Channel,
     rows: Vec<usize>,
 }
 
@@ -60,8 +61,9 @@ impl Strays {
         let first_s = rows.first().and_then(|row| time_s.get(*row)).unwrap_or(&0.0);
         let values = if rows.len() == 1 { "value" } else { "values" };
         format!(
-            "{} single {values} of the {channel} of joint {}, far off those around, replaced by what these say (the first at {first_s:.3} s)",
+            "{} single {values} of the {} of joint {}, far off those around, replaced by what these say (the first at {first_s:.3} s)",
             rows.len(),
+            channel.name(),
             joint + 1
         )
     }
@@ -95,7 +97,7 @@ fn mend_torque(record: &mut Record) -> Vec<Strays> {
     };
     let joints = (0..record.torque_nm.joints()).into_par_iter();
     let found = joints.map(|j| (j, of_joint(j))).collect();
-    replace(&mut record.torque_nm, "torque", found)
+    replace(&mut record.torque_nm, Channel::Torque, found)
 }
 
 /// Whether each row is within [`STOPS_S`] of a row at which a joint with the velocities `qd_rad_s` comes to rest or starts
@@ -156,7 +158,7 @@ fn mend_motion(record: &mut Record) -> Vec<Strays> {
         far
     };
     let angles = (0..joints).into_par_iter().map(|j| (j, of_angle(j))).collect();
-    let mut strays = replace(&mut record.q_rad, "angle", angles);
+    let mut strays = replace(&mut record.q_rad, Channel::Angle, angles);
     let of_velocity = |j: usize| {
         let (q, qd) = (record.q_rad.joint(j), record.qd_rad_s.joint(j));
         let [stamped, even] = [&stamped, &even].map(|steps| {
@@ -170,7 +172,7 @@ fn mend_motion(record: &mut Record) -> Vec<Strays> {
         by_all(qd, [far_off(qd), stamped, even])
     };
     let velocities = (0..joints).into_par_iter().map(|j| (j, of_velocity(j))).collect();
-    strays.extend(replace(&mut record.qd_rad_s, "velocity", velocities));
+    strays.extend(replace(&mut record.qd_rad_s, Channel::Velocity, velocities));
     strays
 }
 
@@ -185,7 +187,7 @@ fn by_all<const N: usize>(y: &[f64], ways: [Vec<Stray>; N]) -> Vec<Stray> {
 /// Replaces the readings `found`: on a joint with at least [`FEWEST`] of them all, on others those of an [`ACCIDENT`].
 fn replace(
     signals: &mut JointSignals,
-    channel: &'static str,
+    channel: Channel,
     found: Vec<(usize, Vec<Stray>)>,
 ) -> Vec<Strays> {
     let meant = found.into_iter().map(|(joint, mut far)| {
@@ -208,16 +210,6 @@ fn replace(
         .collect()
 }
 
-/// Wild readings of these channels of a joint, as the words of a cause.
-fn words_of_cause(channels: &[&str]) -> String {
-    format!("single values of {} that are far off", channels.join(" and "))
-}
-
-/// Whether a cause with these words is one of wild torques alone.
-pub fn are_of_torque_alone(in_words: &str) -> bool {
-    in_words == words_of_cause(&["torque"])
-}
-
 /// One cause for every joint with wild readings, in a record of `rows` rows.
 pub fn causes(strays: &[Strays], rows: usize) -> Vec<Cause> {
     let strays: Vec<&Strays> = strays.iter().filter(|strays| strays.are_many()).collect();
@@ -230,9 +222,9 @@ pub fn causes(strays: &[Strays], rows: usize) -> Vec<Cause> {
         let mut wild: Vec<usize> = own.iter().flat_map(|stray| &stray.rows).copied().collect();
         wild.sort_unstable();
         wild.dedup();
-        let channels: Vec<&str> = own.iter().map(|stray| stray.channel).collect();
+        let fault = RecordFault::WildReadings(own.iter().map(|stray| stray.channel).collect());
         let parameters = [("fraction", Estimate::exact(wild.len() as f64 / rows as f64, ""))];
-        Cause::certain(Kind::Outliers, Some(joint), &words_of_cause(&channels), FAR, &parameters)
+        Cause::of_the_record(fault, Some(joint), FAR, &parameters)
     };
     joints.into_iter().map(of_joint).collect()
 }
@@ -291,16 +283,21 @@ fn steps(y: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::Kind;
     use crate::diagnose::record::moves_and_rests;
 
     /// One row while the joint moves, two next to each other, and one at rest.
     const WILD: [usize; 4] = [150, 320, 321, 700];
 
-    /// One channel of a record's joint.
-    type Channel = fn(&mut Record) -> &mut [f64];
-    const ANGLE: Channel = |record| record.q_rad.joint_mut(0);
-    const VELOCITY: Channel = |record| record.qd_rad_s.joint_mut(0);
-    const TORQUE: Channel = |record| record.torque_nm.joint_mut(0);
+    /// The readings of one channel of a record's only joint.
+    fn readings(record: &mut Record, channel: Channel) -> &mut [f64] {
+        let signals = match channel {
+            Channel::Angle => &mut record.q_rad,
+            Channel::Velocity => &mut record.qd_rad_s,
+            Channel::Torque => &mut record.torque_nm,
+        };
+        signals.joint_mut(0)
+    }
 
     /// Motion is restored by rules with errors of h³/12 |q̇̈| = 1.7e-7 rad per row and h²/6 |q̇̈| = 4e-5 rad/s. Torque
     /// is restored to the median of nine, which is off by 0.42 of the noise of 0.3 Nm, while the clean reading itself
@@ -308,17 +305,17 @@ mod tests {
     #[test]
     fn wild_readings_go_back_to_where_they_were() {
         for (channel, name, off, tolerance) in [
-            (ANGLE, "angle", 0.04, 2e-6),
-            (VELOCITY, "velocity", 0.5, 1e-4),
-            (TORQUE, "torque", -40.0, 1.6),
+            (Channel::Angle, "angle", 0.04, 2e-6),
+            (Channel::Velocity, "velocity", 0.5, 1e-4),
+            (Channel::Torque, "torque", -40.0, 1.6),
         ] {
             let mut clean = moves_and_rests(4.0, 0.3);
             let mut record = moves_and_rests(4.0, 0.3);
-            WILD.iter().for_each(|&row| channel(&mut record)[row] += off);
+            WILD.iter().for_each(|&row| readings(&mut record, channel)[row] += off);
             let strays = mend(&mut record);
             assert_eq!(strays.len(), 1, "{name}");
-            assert_eq!((strays[0].channel, &*strays[0].rows), (name, &WILD[..]));
-            let (mended, clean) = (channel(&mut record), channel(&mut clean));
+            assert_eq!((strays[0].channel, &*strays[0].rows), (channel, &WILD[..]));
+            let (mended, clean) = (readings(&mut record, channel), readings(&mut clean, channel));
             let furthest =
                 mended.iter().zip(clean).map(|(a, b)| (*a - *b).abs()).fold(0.0, f64::max);
             assert!(furthest < tolerance, "{name}: {furthest}");

@@ -23,8 +23,8 @@ pub struct Kept<'s, 'a> {
     pub(super) with_common: bool,
 }
 
-/// The causes that were found, and twice the log-evidence for all of them together against none.
-pub struct Found {
+/// Causes that were found together, and twice the log-evidence for all of them against none.
+pub struct CauseSet {
     pub causes: Vec<Contender>,
     pub evidence: f64,
 }
@@ -34,11 +34,11 @@ pub struct Found {
 /// A cause of the arm as a whole, which is found first because no cause of a single joint explains as much, may stand
 /// in for a different effect that all joints have. Causes of single joints replace it where the evidence leaves no
 /// doubt, unless they are of its own family, joint by joint.
-pub fn select(study: &Study) -> Found {
+pub fn select(study: &Study) -> CauseSet {
     let grown = |with_common: bool| {
         let mut kept = Kept { study, causes: Vec::new(), with_common };
         kept.grow();
-        Found { evidence: kept.total_evidence(), causes: kept.causes }
+        CauseSet { evidence: kept.total_evidence(), causes: kept.causes }
     };
     let found = grown(study.scene.periodic);
     if found.causes.iter().all(|cause| cause.entry.site.is_some()) {

@@ -69,9 +69,10 @@ impl Diagnosis {
         );
         out.extend(told::overview(&self.causes));
         out.extend(told::in_sentences(&self.causes, self.noise_floor_nm.is_some()));
-        if let Some(unexplained) = &self.unexplained {
-            out.push(unexplained.sentence());
-        }
+        out.extend(match &self.unexplained {
+            Some(unexplained) => Some(unexplained.sentence()),
+            None => told::without_a_name(&self.causes),
+        });
         out.extend(self.form_error.as_ref().map(Unexplained::as_form_error));
         out.extend(told::in_the_table_alone(&self.causes));
         if out.is_empty() {

@@ -10,7 +10,7 @@ use super::error::DiagnoseError;
 use super::extension::{Effect, Extension, tell_friction};
 use super::kind::Kind;
 use super::scene::OtherFriction;
-use super::selection::{FINALISTS, Found, Kept};
+use super::selection::{CauseSet, FINALISTS, Kept};
 use super::significance::{FAR_AHEAD, LEAST_EVIDENCE};
 use super::study::{Entry, Place, Study};
 use crate::base::BaseSet;
@@ -33,7 +33,7 @@ const ROUNDS_OF_PRODUCTS: usize = 3;
 /// ([`Kept::of_a_single_run`]).
 pub fn settled<'s>(
     study: Study<'s>,
-    found: Found,
+    found: CauseSet,
     sources: (&Arm, &BaseSet),
     log: &str,
 ) -> Result<(Study<'s>, Vec<Contender>), DiagnoseError> {
@@ -71,11 +71,11 @@ pub fn as_told(study: &mut Study, mut causes: Vec<Contender>) -> Vec<Contender> 
 /// The rounds of [`settled`].
 fn in_turn<'s>(
     mut study: Study<'s>,
-    found: Found,
+    found: CauseSet,
     sources: (&Arm, &BaseSet),
     log: &str,
-) -> Result<(Study<'s>, Found), DiagnoseError> {
-    let Found { mut causes, mut evidence } = found;
+) -> Result<(Study<'s>, CauseSet), DiagnoseError> {
+    let CauseSet { mut causes, mut evidence } = found;
     for round in 1..=ROUNDS {
         let entries: Vec<&Entry> = causes.iter().map(|c| &c.entry).collect();
         let mut refined = Extension::fit(&study, &entries, &study.torque);
@@ -99,7 +99,7 @@ fn in_turn<'s>(
             break;
         }
     }
-    Ok((study, Found { causes, evidence }))
+    Ok((study, CauseSet { causes, evidence }))
 }
 
 /// What was `found` with laws that change its friction, or that its bristles hold, if that explains the log far better;
@@ -109,12 +109,12 @@ fn in_turn<'s>(
 /// Coulomb and viscous friction alone, and what falls with speed was fitted without the width. A law that changes the
 /// friction of others is therefore taken on trial, refined in turn with them, and only then has to be needed; and so is
 /// a Stribeck curve on a joint with bristles.
-fn with_products(study: &mut Study, found: &Found) -> Option<Found> {
+fn with_products(study: &mut Study, found: &CauseSet) -> Option<CauseSet> {
     let joints = 0..study.scene.joints();
     let before: Vec<OtherFriction> =
         joints.clone().map(|j| study.scene.other_friction(j).clone()).collect();
     let told = study.told.clone();
-    let mut better: Option<Found> = None;
+    let mut better: Option<CauseSet> = None;
     for j in joints {
         let start = better.as_ref().unwrap_or(found).causes.clone();
         for contender in for_trial(study, start, j) {
@@ -182,7 +182,7 @@ fn for_trial(study: &mut Study, causes: Vec<Contender>, j: usize) -> Vec<Contend
 }
 
 /// The causes of `best` with `contender`, refined in turn, if it is needed and the log is explained better enough.
-fn tried(study: &mut Study, best: &Found, contender: Contender) -> Option<Found> {
+fn tried(study: &mut Study, best: &CauseSet, contender: Contender) -> Option<CauseSet> {
     let place = contender.entry.place();
     let least = best.evidence + margin(study.families[place.0].kind());
     let mut trial = best.causes.clone();
@@ -196,7 +196,7 @@ fn tried(study: &mut Study, best: &Found, contender: Contender) -> Option<Found>
     let evidence = kept.total_evidence();
     let is_better =
         evidence > least && kept.causes.iter().any(|cause| cause.entry.place() == place);
-    is_better.then_some(Found { causes: kept.causes, evidence })
+    is_better.then_some(CauseSet { causes: kept.causes, evidence })
 }
 
 /// Tells the scene of `study` the friction of the `causes`, and prepares them and the places that are wanted besides.

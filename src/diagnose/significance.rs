@@ -34,6 +34,12 @@ impl Kept<'_, '_> {
         let study = self.study;
         let site = contender.entry.site;
         let span = study.span(&contender.entry, others);
+        // The score of a cause is that of its last refinement. What was exchanged or dropped since is not in it, and
+        // need not be. A contender that is added is judged again once all causes that share a joint with it (in a log
+        // that repeats: all causes) are refined beside it; along a single run, causes of other joints hardly change a
+        // score. To score every cause anew would take the span of all others for each cause and contender, and would be
+        // no truer: a score counts what a cause alone explains beside the others, while its error of form is a share of
+        // all that its law does.
         let is_left_by = |(c, cause): (usize, &Contender)| {
             if cause.entry.place() == contender.entry.place() {
                 return false;

@@ -7,9 +7,10 @@
 
 use rayon::prelude::*;
 
-use super::data_faults::{MOVES_RAD_S, REPEATED};
-use super::kind::Kind;
+use super::channel::Channel;
+use super::data_faults::MOVES_RAD_S;
 use super::record::Record;
+use super::record_fault::RecordFault;
 use super::verdict::{Cause, Estimate};
 use crate::median::median;
 use crate::robot::JointSignals;
@@ -42,13 +43,10 @@ const COARSE: f64 = 0.5;
 /// more than this share of those of every channel is common to all channels of a joint, all of the joint does.
 const ALIKE: f64 = 0.9;
 
-/// Names of the channels of one joint.
-const CHANNELS: [&str; 3] = ["angle", "velocity", "torque"];
-
 /// Stale readings of one joint.
 struct OfJoint {
     joint: usize,
-    /// Rows with stale readings by channel, in the order of [`CHANNELS`].
+    /// Rows with stale readings by channel, in the order of [`Channel::ALL`].
     readings: [Vec<usize>; 3],
     /// Rows in which the torque hangs.
     hangs: Vec<usize>,
@@ -58,6 +56,12 @@ impl OfJoint {
     /// Rows with a stale or hanging reading, in ascending order.
     fn rows(&self) -> Vec<usize> {
         in_order(self.readings.iter().chain([&self.hangs]).flatten().copied())
+    }
+
+    /// Whether readings of this channel are stale, or hang.
+    fn is_stale_in(&self, channel: Channel) -> bool {
+        let hangs = channel == Channel::Torque && !self.hangs.is_empty();
+        hangs || !self.readings[channel as usize].is_empty()
     }
 
     /// Whether all channels repeat the same rows.
@@ -129,20 +133,17 @@ pub fn mend(record: &mut Record) -> StaleReadings {
 /// One cause for all joints if they repeat the same rows, else one cause for every joint that repeats any.
 fn causes(found: &[OfJoint], samples: usize) -> Vec<Cause> {
     let rows: Vec<Vec<usize>> = found.iter().map(OfJoint::rows).collect();
-    let channels = |stale: &[&OfJoint]| {
-        let is_stale = |c: usize| {
-            stale.iter().any(|s| !s.readings[c].is_empty() || c == 2 && !s.hangs.is_empty())
-        };
-        let names: Vec<&str> = (0..3).filter(|c| is_stale(*c)).map(|c| CHANNELS[c]).collect();
-        names.join(" and ")
+    let channels = |stale: &[&OfJoint]| -> Vec<Channel> {
+        let is_stale = |channel: &Channel| stale.iter().any(|s| s.is_stale_in(*channel));
+        Channel::ALL.into_iter().filter(is_stale).collect()
     };
     let said = |joint: Option<usize>, rows: &[usize], stale: &[&OfJoint]| {
         let parameters = [("fraction", Estimate::exact(rows.len() as f64 / samples as f64, ""))];
-        let words = match stale.iter().all(|s| s.is_of_whole_rows()) {
-            true => REPEATED.to_owned(),
-            false => format!("readings of the {} that repeat the one before", channels(stale)),
+        let fault = match stale.iter().all(|s| s.is_of_whole_rows()) {
+            true => RecordFault::RepeatedRows,
+            false => RecordFault::RepeatedReadings(channels(stale)),
         };
-        Cause::certain(Kind::DroppedSamples, joint, &words, f64::INFINITY, &parameters)
+        Cause::of_the_record(fault, joint, f64::INFINITY, &parameters)
     };
     if rows.len() > 1 && are_alike(&rows) {
         let all: Vec<&OfJoint> = found.iter().collect();
@@ -276,6 +277,7 @@ fn interpolate(time_s: &[f64], signals: &mut JointSignals, j: usize, stale: &[us
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::Kind;
     use crate::diagnose::record::moves_and_rests as record;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
@@ -368,6 +370,8 @@ mod tests {
         assert_eq!(causes.len(), 1);
         assert_eq!((causes[0].kind, causes[0].joint), (Kind::DroppedSamples, Some(1)));
         assert_eq!(causes[0].in_words, "readings of the angle that repeat the one before");
+        let of_the_angle = RecordFault::RepeatedReadings(vec![Channel::Angle]);
+        assert_eq!(causes[0].record_fault, Some(of_the_angle));
         // The joint moves in half of the rows, a tenth of these is stale, and at the slow ends of a motion stale
         // readings go unseen.
         let left_out = (before - record.time_s.len()) as f64 / before as f64;
@@ -387,8 +391,8 @@ mod tests {
             }
         }
         let causes = mend(&mut record).causes;
-        let told: Vec<_> = causes.iter().map(|c| (c.kind, c.joint, c.in_words.as_str())).collect();
-        assert_eq!(told, [(Kind::DroppedSamples, Some(1), REPEATED)]);
+        let told: Vec<_> = causes.iter().map(|c| (c.kind, c.joint, &c.record_fault)).collect();
+        assert_eq!(told, [(Kind::DroppedSamples, Some(1), &Some(RecordFault::RepeatedRows))]);
     }
 
     /// A cubic through its good neighbours puts a smooth angle back to where it was, as is done where too many rows are

@@ -1,7 +1,7 @@
 //! A clock that stood still while the arm moved on: angles and velocities tell for how long.
 
 use super::data_faults::{FAR, step_s};
-use super::kind::Kind;
+use super::record_fault::RecordFault;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
 use crate::identify::covariance::quantile_95;
@@ -113,13 +113,8 @@ impl Stalls {
         let rhythm = rhythm(rows);
         let every = rhythm.ok().map(|rows| ("every_rows", Estimate::exact(rows, "rows")));
         let parameters: Vec<_> = [("lost_s", lost)].into_iter().chain(every).collect();
-        let cause = Cause::certain(
-            Kind::ClockFault,
-            None,
-            "time that passed without the time stamps showing it",
-            lost_s / sigma_s.max(f64::MIN_POSITIVE),
-            &parameters,
-        );
+        let strength = lost_s / sigma_s.max(f64::MIN_POSITIVE);
+        let cause = Cause::of_the_record(RecordFault::LostTime, None, strength, &parameters);
         Cause { form: rhythm.err(), ..cause }
     }
 }

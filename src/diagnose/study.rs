@@ -15,11 +15,11 @@ use super::extension::Effect;
 use super::image::{Column, Image, Span, dot};
 use super::memory::Memory;
 use super::scene::Scene;
+use super::setup::Setup;
 use super::statistic::{Score, Statistic};
 use super::whitening::{PeriodWhitening, RunWhitening, Whitening};
 use crate::base::BaseSet;
-use crate::identify::{Options, Regression};
-use crate::robot::Arm;
+use crate::identify::Regression;
 
 /// A family at one site with one shape.
 #[derive(Debug, Clone)]
@@ -110,7 +110,7 @@ impl<'a> Study<'a> {
     /// entries until it [looks everywhere](Self::look_everywhere).
     pub fn new(
         families: &'a [Box<dyn Candidate>],
-        (arm, set, options): (&Arm, &BaseSet, &Options),
+        Setup { arm, set, options }: Setup,
         regression: &'a Regression,
         (theta, sigma_nm): (&[f64], &[f64]),
         log: &str,

@@ -4,7 +4,7 @@
 //! The table of causes holds all of them.
 
 use super::kind::Kind;
-use super::verdict::{Cause, Estimate};
+use super::verdict::{Cause, Estimate, are_unlikely};
 use crate::number::significant;
 
 /// Up to this many touches get a sentence each.
@@ -95,6 +95,13 @@ pub(super) fn overview(causes: &[Cause]) -> Option<String> {
     };
     let kinds: Vec<String> = kinds.into_iter().map(sites).collect();
     Some(format!("{} causes are named: {}.", likely.len(), kinds.join(", ")))
+}
+
+/// The sentence about a log of which nothing but unlikely `causes` is known; `None` for any other.
+pub(super) fn without_a_name(causes: &[Cause]) -> Option<String> {
+    are_unlikely(causes).then(|| {
+        "The log shows more than chance explains, but no known effect explains it well.".to_owned()
+    })
 }
 
 /// One sentence with the names of the causes that are too unlikely for a sentence of their own; `None` if there are
@@ -284,5 +291,8 @@ mod tests {
         let said = in_the_table_alone(&causes).unwrap();
         assert!(said.ends_with("(confidence below 0.1 %): elasticity (joint 1)."), "{said}");
         assert_eq!(in_the_table_alone(&causes[1..]), None);
+        assert!(without_a_name(&causes[..1]).is_some());
+        assert_eq!(without_a_name(&causes), None);
+        assert_eq!(without_a_name(&[]), None);
     }
 }

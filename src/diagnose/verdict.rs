@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::kind::Kind;
 use super::misfit::SINCE_THE_START;
 use super::payload::PayloadFinding;
+use super::record_fault::RecordFault;
 use super::replay::Replay;
 use crate::identify::Doubt;
 
@@ -97,6 +98,10 @@ pub struct Cause {
     pub strength: f64,
     /// The effect in words.
     pub in_words: String,
+    /// What a fault of the record did to the readings, by which the rest of the program knows it; none for other causes.
+    /// The JSON says it in words.
+    #[serde(skip)]
+    pub record_fault: Option<RecordFault>,
     /// Which form of the family's law fits best; null for the usual form, and where the parameters say it.
     pub form: Option<&'static str>,
     /// Whether the cause is a law of one coefficient whose interval includes no effect at all; it is stated with a
@@ -108,6 +113,12 @@ pub struct Cause {
 
 /// A cause less likely than this is no answer.
 const UNLIKELY: f64 = 1e-3;
+
+/// Whether there are `causes` and all of them are [unlikely](Cause::is_unlikely). Chance does not explain such a log,
+/// and no name is the answer.
+pub(super) fn are_unlikely(causes: &[Cause]) -> bool {
+    !causes.is_empty() && causes.iter().all(Cause::is_unlikely)
+}
 
 impl Cause {
     /// A cause with confidence 1, at joint `site` (from 0 on) or of the arm as a whole, that nothing else resembles.
@@ -129,10 +140,22 @@ impl Cause {
             separating_experiment: None,
             strength,
             in_words: in_words.to_owned(),
+            record_fault: None,
             form: None,
             may_be_none: false,
             rivals: Vec::new(),
         }
+    }
+
+    /// A fault of the record of joint `site` (from 0 on) or of the arm as a whole, which is certain.
+    pub(super) fn of_the_record(
+        fault: RecordFault,
+        site: Option<usize>,
+        strength: f64,
+        parameters: &[(&'static str, Estimate)],
+    ) -> Self {
+        let cause = Self::certain(fault.kind(), site, &fault.in_words(), strength, parameters);
+        Self { record_fault: Some(fault), ..cause }
     }
 
     /// Whether the cause is less likely than one in a thousand: something else, which is no cause that could be named,
@@ -352,10 +375,22 @@ pub enum Verdict {
     NothingFound,
     /// Causes named; nothing is left but what their laws leave because they are not exact.
     CauseNamed,
-    /// Something is left that no family explains, or a second log differs by more than a body on the flange.
+    /// Something is left that no family explains, every cause is unlikely, or a second log differs by more than a body
+    /// on the flange.
     Unexplained,
     /// No arm has the base parameters that were identified.
     Contradicted,
+}
+
+impl Verdict {
+    /// The verdict on a log with these `causes`; whether something `is_left` that no family explains.
+    pub(super) fn of(causes: &[Cause], is_left: bool) -> Self {
+        match causes {
+            _ if is_left || are_unlikely(causes) => Self::Unexplained,
+            [] => Self::NothingFound,
+            _ => Self::CauseNamed,
+        }
+    }
 }
 
 impl Diagnosis {
@@ -408,4 +443,23 @@ pub fn class_holds(
     let here = joint == site || joint.is_none();
     let elsewhere = joint.map(|j| format!("{kind}@{j}"));
     class.iter().any(|c| here && c == kind.name() || Some(c) == elsewhere.as_ref())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cause below one in a thousand is no name, alone or beside others of its like.
+    #[test]
+    fn what_is_unlikely_is_not_named() {
+        let likely = Cause::certain(Kind::Elasticity, Some(0), "a soft gear", 5.9, &[]);
+        let unlikely = Cause { confidence: 5e-4, ..likely.clone() };
+        assert_eq!(Verdict::of(&[], false), Verdict::NothingFound);
+        let alone = [unlikely.clone(), unlikely.clone()];
+        assert_eq!(Verdict::of(&alone[..1], false), Verdict::Unexplained);
+        assert_eq!(Verdict::of(&alone, false), Verdict::Unexplained);
+        let beside = [unlikely, likely];
+        assert_eq!(Verdict::of(&beside, false), Verdict::CauseNamed);
+        assert_eq!([Verdict::of(&[], true), Verdict::of(&beside, true)], [Verdict::Unexplained; 2]);
+    }
 }

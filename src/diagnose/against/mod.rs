@@ -115,7 +115,7 @@ pub fn moved_together(study: &Study, simulation: Nominal, base: &Base) -> Option
 }
 
 /// An effect that was found beside the null model.
-pub struct Found<'a> {
+pub struct AcceptedEffect<'a> {
     /// The law, at its best shape.
     pub entry: &'a Entry,
     /// Its numbers.
@@ -141,7 +141,7 @@ pub fn explain(
     study: &Study,
     (arm, set): (&Arm, &BaseSet),
     simulation: Nominal,
-    accepted: &[Found],
+    accepted: &[AcceptedEffect],
     fitted_nm: &JointSignals,
 ) -> Explained {
     let Nominal { theta, covariance, .. } = simulation;
@@ -157,7 +157,7 @@ pub fn explain(
         let place = (study.families[entry.family].kind(), entry.site);
         changes.iter().any(|c| (c.kind, c.site) == place)
     };
-    let is_beside = |found: &&Found| !is_change(found.entry);
+    let is_beside = |found: &&AcceptedEffect| !is_change(found.entry);
     let mut beside: Vec<Beside> = accepted
         .iter()
         .filter(is_beside)

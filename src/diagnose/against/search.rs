@@ -15,7 +15,7 @@ use super::super::statistic::Score;
 use super::super::study::{Entry, Study};
 use super::super::verdict::{Cause, Rival};
 use super::super::whitening::RepeatingNoise;
-use super::Found;
+use super::AcceptedEffect;
 use super::changes::{Change, combined};
 
 /// Largest tilt, zero or length at which a change is evaluated, rad or m.
@@ -41,7 +41,7 @@ pub(super) struct Beside<'a> {
 }
 
 impl<'a> Beside<'a> {
-    pub(super) fn new(study: &Study, found: &Found<'a>, unknown: &Unknown) -> Self {
+    pub(super) fn new(study: &Study, found: &AcceptedEffect<'a>, unknown: &Unknown) -> Self {
         let mut room = tangents(study, found.effect);
         room.extend(found.alike.iter().flat_map(|entry| study.whole_images(entry)));
         Self { entry: found.entry, room: unknown.whitened(room) }
@@ -317,6 +317,7 @@ impl Search<'_> {
             gain_fraction: None,
             strength: lambda.max(0.0).sqrt(),
             in_words: change.in_words.to_owned(),
+            record_fault: None,
             form: None,
             rivals: behind.collect(),
         }

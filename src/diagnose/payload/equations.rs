@@ -7,6 +7,7 @@ use super::super::error::DiagnoseError;
 use super::super::extension::Extension;
 use super::super::image::Column;
 use super::super::scene::Scene;
+use super::super::setup::Setup;
 use super::super::verdict::Estimate;
 use super::super::whitening::{RunWhitening, Whitening};
 use super::Shared;
@@ -90,7 +91,7 @@ pub(super) fn equations(
     theta: &[f64],
     first_block: usize,
 ) -> Result<Vec<Equations>, DiagnoseError> {
-    let Shared { arm, set, options, families, extension } = shared;
+    let Shared { setup: Setup { arm, set, options }, families, extension } = shared;
     let prepared = &regression.prepared;
     let problem = &regression.problem;
     let scene = extension.telling(families, Scene::new(arm, set, theta, prepared));

@@ -2,6 +2,7 @@
 
 use super::super::clustered::{Equations, Solution, solve};
 use super::super::error::DiagnoseError;
+use super::super::setup::Setup;
 use super::super::verdict::Estimate;
 use super::Shared;
 use super::body::{BODY, Body, STATIC};
@@ -32,10 +33,11 @@ impl Fit {
         second: &Regression,
         log: &str,
     ) -> Result<Self, DiagnoseError> {
-        let joints = shared.arm.dof();
-        let Body { terms, told } = Body::new(shared.set, joints);
+        let Setup { arm, set, .. } = shared.setup;
+        let joints = arm.dof();
+        let Body { terms, told } = Body::new(set, joints);
         let mut loaded_theta = shared.extension.theta.clone();
-        let layout = Layout::new(shared.set, shared.extension, joints);
+        let layout = Layout::new(set, shared.extension, joints);
         let unloaded = equations(shared, &layout, first, &shared.extension.theta, 0)?;
         let offset = blocks(&unloaded);
         let elsewhere = shared.extension.elsewhere(shared.families);

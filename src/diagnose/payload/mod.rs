@@ -22,10 +22,9 @@ use super::chance;
 use super::error::DiagnoseError;
 use super::extension::{Effect, Extension};
 use super::kind::Kind;
+use super::setup::Setup;
 use super::verdict::{Cause, Estimate};
-use crate::base::BaseSet;
-use crate::identify::{Options, Regression};
-use crate::robot::Arm;
+use crate::identify::Regression;
 
 /// What a second log says about a body on the flange.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -59,9 +58,7 @@ pub struct PayloadFinding {
 
 /// What stays the same for both logs.
 pub(super) struct Shared<'a> {
-    pub(super) arm: &'a Arm,
-    pub(super) set: &'a BaseSet,
-    pub(super) options: &'a Options,
+    pub(super) setup: Setup<'a>,
     pub(super) families: &'a [Box<dyn Candidate>],
     /// Base parameters and effects found in the first log.
     pub(super) extension: &'a Extension,

@@ -13,13 +13,11 @@
 //! - **Faults of the record** were found by what they do to readings. The plant has them where it does the same; their
 //!   rows are drawn anew.
 
-use crate::diagnose::Kind;
 use crate::diagnose::candidates::elasticity::{ON_MOTOR, damping_ratio};
 use crate::diagnose::candidates::load_friction::{MOTOR_SIDE, ROTOR};
 use crate::diagnose::candidates::stribeck::{RATIONAL, STEEP_AT_REST};
 use crate::diagnose::candidates::time_skew::LOW_PASS;
-use crate::diagnose::data_faults::{MISSING, REPEATED};
-use crate::diagnose::outliers::are_of_torque_alone;
+use crate::diagnose::{Channel, Kind, RecordFault};
 use crate::plant::PlantConfig;
 use crate::plant::faults::{self, Effect, Fall};
 
@@ -59,20 +57,20 @@ const SHARPEST_RAD_S: f64 = 1e-3;
 
 /// A cause as diagnosed.
 #[derive(Debug, Clone, Copy)]
-pub struct Found<'a> {
+pub struct DiagnosedCause<'a> {
     /// Its family.
     pub kind: Kind,
     /// Joint, from 1; `None`: the arm as a whole.
     pub joint: Option<usize>,
     /// Variant of the family's law.
     pub variant: usize,
-    /// The cause in words: they tell which readings a fault of the record has spoilt.
-    pub in_words: &'a str,
+    /// What a fault of the record did to the readings; `None` for other causes.
+    pub record_fault: Option<&'a RecordFault>,
     /// Names of its physical parameters, with SI values.
     pub quantities: &'a [(&'static str, f64)],
 }
 
-impl Found<'_> {
+impl DiagnosedCause<'_> {
     fn value(&self, name: &str) -> Option<f64> {
         let found = self.quantities.iter().find(|(known, _)| *known == name);
         found.map(|(_, value)| *value).filter(|value| value.is_finite())
@@ -321,9 +319,9 @@ impl Found<'_> {
             // The plant leaves whole rows out or repeats them, or repeats angle, velocity and torque of one joint
             // together.
             Kind::DroppedSamples => {
-                let repeat = match self.in_words {
-                    MISSING => false,
-                    REPEATED => true,
+                let repeat = match self.record_fault {
+                    Some(RecordFault::MissingRows) => false,
+                    Some(RecordFault::RepeatedRows) => true,
                     _ => return Some(Counterpart::None(OTHER_ROWS)),
                 };
                 Effect::DroppedSamples(faults::DroppedSamples {
@@ -340,11 +338,13 @@ impl Found<'_> {
                 channel: faults::ReadingChannel::Torque,
             }),
             // How far off they are is not reported: those of the plant are anywhere within the limits of the drive.
-            Kind::Outliers if are_of_torque_alone(self.in_words) => {
-                let fraction = value("fraction")?;
-                Effect::Outliers(faults::Outliers { joint: self.joint, fraction })
-            }
-            Kind::Outliers => return Some(Counterpart::None(OTHER_CHANNEL)),
+            Kind::Outliers => match self.record_fault {
+                Some(RecordFault::WildReadings(of)) if of[..] == [Channel::Torque] => {
+                    let fraction = value("fraction")?;
+                    Effect::Outliers(faults::Outliers { joint: self.joint, fraction })
+                }
+                _ => return Some(Counterpart::None(OTHER_CHANNEL)),
+            },
             // Of other groups.
             _ => return None,
         };
@@ -375,9 +375,9 @@ mod tests {
     use crate::plant::faults::{DroppedSamples, Outliers};
 
     /// A fault of the record that spoils a hundredth of the readings.
-    fn fault(kind: Kind, joint: Option<usize>, in_words: &str) -> Counterpart {
-        let quantities = &[("fraction", 0.01)];
-        Found { kind, joint, variant: 0, in_words, quantities }.counterpart()
+    fn counterpart(fault: &RecordFault, joint: Option<usize>) -> Counterpart {
+        let (kind, record_fault, quantities) = (fault.kind(), Some(fault), &[("fraction", 0.01)]);
+        DiagnosedCause { kind, joint, variant: 0, record_fault, quantities }.counterpart()
     }
 
     #[test]
@@ -387,22 +387,26 @@ mod tests {
             let rows = DroppedSamples { joint, fraction, repeat };
             Counterpart::OfTheRecord(Effect::DroppedSamples(rows))
         };
-        let kind = Kind::DroppedSamples;
-        assert_eq!(fault(kind, None, MISSING), lost(None, false));
-        assert_eq!(fault(kind, None, REPEATED), lost(None, true));
-        assert_eq!(fault(kind, Some(3), REPEATED), lost(Some(3), true));
-        let angle = "readings of the angle that repeat the one before";
-        assert_eq!(fault(kind, Some(3), angle), Counterpart::None(OTHER_ROWS));
+        assert_eq!(counterpart(&RecordFault::MissingRows, None), lost(None, false));
+        assert_eq!(counterpart(&RecordFault::RepeatedRows, None), lost(None, true));
+        assert_eq!(counterpart(&RecordFault::RepeatedRows, Some(3)), lost(Some(3), true));
+        let angles = RecordFault::RepeatedReadings(vec![Channel::Angle]);
+        for (fault, joint) in [(angles, Some(3)), (RecordFault::MissingOrRepeatedRows, None)] {
+            assert_eq!(counterpart(&fault, joint), Counterpart::None(OTHER_ROWS));
+        }
     }
 
     #[test]
     fn wild_angles_are_no_wild_torques() {
-        let (kind, joint, fraction) = (Kind::Outliers, Some(3), 0.01);
+        let (joint, fraction) = (Some(3), 0.01);
         let of_torque = Effect::Outliers(Outliers { joint, fraction });
-        let words = |channel: &str| format!("single values of {channel} that are far off");
-        assert_eq!(fault(kind, joint, &words("torque")), Counterpart::OfTheRecord(of_torque));
-        for other in ["angle", "velocity", "angle and torque"] {
-            assert_eq!(fault(kind, joint, &words(other)), Counterpart::None(OTHER_CHANNEL));
+        let of = |channels: &[Channel]| {
+            counterpart(&RecordFault::WildReadings(channels.to_vec()), joint)
+        };
+        let [angle, velocity, torque] = Channel::ALL;
+        assert_eq!(of(&[torque]), Counterpart::OfTheRecord(of_torque));
+        for others in [&[angle][..], &[velocity], &[angle, torque]] {
+            assert_eq!(of(others), Counterpart::None(OTHER_CHANNEL));
         }
     }
 }

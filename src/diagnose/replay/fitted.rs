@@ -1,6 +1,6 @@
 //! The effects of the extended model, with what they are in the plant.
 
-use super::counterpart::{Counterpart, Found};
+use super::counterpart::{Counterpart, DiagnosedCause};
 use crate::diagnose::candidates::Candidate;
 use crate::diagnose::extension::width_of_arm;
 use crate::diagnose::{Effect, Kind, Scene};
@@ -42,8 +42,8 @@ impl<'e> Fitted<'e> {
         let quantities = family.quantities(scene, *site, *shape, b);
         let quantities: Vec<_> = quantities.iter().map(|q| (q.name, q.value)).collect();
         let (kind, joint) = (family.kind(), site.map(|j| j + 1));
-        let (variant, in_words) = (shape.variant, family.in_words_of(b));
-        let found = Found { kind, joint, variant, in_words, quantities: &quantities };
-        Self { effect, kind, joint, counterpart: found.counterpart() }
+        let (variant, quantities) = (shape.variant, &quantities);
+        let cause = DiagnosedCause { kind, joint, variant, record_fault: None, quantities };
+        Self { effect, kind, joint, counterpart: cause.counterpart() }
     }
 }

@@ -24,7 +24,7 @@ use super::rms::rms_where;
 use crate::plant::faults::Effect;
 use crate::robot::JointSignals;
 
-pub use counterpart::{Counterpart, Found};
+pub use counterpart::{Counterpart, DiagnosedCause};
 pub(super) use course::measured_nm;
 pub use error::ReplayError;
 pub use fitted::Fitted;

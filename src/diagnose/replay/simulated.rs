@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::counterpart::{Counterpart, Found};
+use super::counterpart::{Counterpart, DiagnosedCause};
 use super::course::plant_config;
 use super::error::ReplayError;
 use super::fitted::Fitted;
@@ -120,9 +120,9 @@ impl ExtendedSimulation {
             }
             let quantities: Vec<_> =
                 cause.parameters.iter().map(|(name, e)| (*name, e.value)).collect();
-            let (in_words, quantities) = (&cause.in_words, &quantities);
-            let found = Found { kind, joint, variant: 0, in_words, quantities };
-            out.take((kind, joint), found.counterpart(), nominal);
+            let (record_fault, quantities) = (cause.record_fault.as_ref(), &quantities);
+            let diagnosed = DiagnosedCause { kind, joint, variant: 0, record_fault, quantities };
+            out.take((kind, joint), diagnosed.counterpart(), nominal);
         }
         Ok(out)
     }

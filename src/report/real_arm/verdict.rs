@@ -198,6 +198,7 @@ mod tests {
             separating_experiment: None,
             strength: 1.0,
             in_words: String::new(),
+            record_fault: None,
             form: None,
             may_be_none: false,
             rivals: Vec::new(),
