@@ -77,6 +77,7 @@ mod dot;
 pub mod dynamics;
 pub mod excitation;
 pub mod identify;
+mod input;
 pub mod log;
 mod median;
 pub mod montecarlo;

@@ -69,6 +69,7 @@ fn bad_input_is_named_before_the_work() {
     fails("--robot ur5 --out t.json --offsets 0,0", "6 joints");
     fails("--robot ur5 --out t.json --offsets 0,x,0,0,0,0", "\"x\"");
     fails("--robot ur5 --out t.json --noise-nm 1,1", "6 joints");
+    fails("--robot ur5 --out t.json --noise-nm 1e-300", "must be in 1e-9 … 1e9 Nm");
     fails("--robot ur5 --out t.json --period nan", "NaN");
     fails("--robot ur5 --out t.json --data 1e300", "= 1.00000e300 must be at most 86400 s");
     fails("--robot ur5 --out t.json --seconds 0", "seconds");

@@ -124,6 +124,24 @@ fn a_light_joint_that_sticks_has_a_stribeck_curve() {
     assert_holds(cause, "vs_rad_s", 0.1);
 }
 
+/// A drive whose torque constant is 15 % off, and whose gear rubs under load: the friction is a share of the torque that
+/// acts, not of the one that is read. It was once 15 % too large, by nine of its σ.
+#[test]
+fn beside_a_wrong_torque_constant_friction_keeps_its_size() {
+    let hidden = "[[effect]]\nkind = \"load_friction\"\njoint = 3\nmu = 0.08\n\
+                  [[effect]]\nkind = \"torque_gain\"\njoint = 3\nerror_fraction = 0.15\n";
+    let run = Run::new(scenario(("gain", 3), ("ur5_identification", 8), NOISE, hidden));
+    let found = run.diagnoser().diagnose(&run.log.measurement("gain"), &[], None).unwrap();
+    let causes = &found.diagnosis.causes;
+    assert_eq!(causes.len(), 2, "{:#?}", found.diagnosis.sentences);
+    let named = |kind: Kind| {
+        let is_it = |c: &&Cause| c.kind == kind && c.joint == Some(3);
+        causes.iter().find(is_it).unwrap_or_else(|| panic!("no {kind}"))
+    };
+    assert_holds(named(Kind::LoadFriction), "mu", 0.08);
+    assert_holds(named(Kind::TorqueGain), "error_fraction", 0.15);
+}
+
 /// Waves in the current that move no link, at up to 96 Hz: sampled at 125 Hz, their aliases are as high as the waves
 /// themselves. The first harmonic of a zigzag has 8/π² of its amplitude.
 #[test]

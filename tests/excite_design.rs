@@ -94,6 +94,23 @@ fn a_design_keeps_its_limits_and_its_form() {
     }
 }
 
+/// Long periods are limited by the ranges of the joints. Random motions are no larger than these, and what is kept free
+/// for the angles between the samples of such a period, or of one in the range, leaves enough of the elbow's ±π rad.
+#[test]
+fn long_periods_are_designed() {
+    for (period_s, period_range_s) in
+        [(200.0, None), (60.0, Some([10.0, 120.0])), (10.0, Some([5.0, 200.0]))]
+    {
+        let mut spec = specification(Criterion::D);
+        spec.variables.period_s = period_s;
+        spec.variables.period_range_s = period_range_s;
+        spec.requirements.check_rate_hz = 100.0;
+        let found = run(&spec, 2).unwrap();
+        assert_eq!(found.feasible_starts, found.starts, "{period_s} s, {period_range_s:?}");
+        assert!(found.margins.feasible());
+    }
+}
+
 /// A free period is optimised, and parameters that are already known are not measured again.
 #[test]
 fn a_free_period_and_a_prior_are_used() {

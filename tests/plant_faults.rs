@@ -336,6 +336,15 @@ fn nonsense_is_refused_with_its_place_and_key() {
         let found = FaultyPlant::new(&arm, &effects(&[table]), &PlantConfig::default());
         assert_eq!(found.is_err(), is_refused, "{table}");
     }
+    // The force on a flange follows from the reach of the arm.
+    arm.joints.iter_mut().for_each(|joint| joint.placement.translation_m.fill(0.0));
+    for (table, is_refused) in [
+        ("kind='contact'\nstart_s=0\nend_s=1\npeak_nm=3", true),
+        ("kind='contact'\njoint=2\nstart_s=0\nend_s=1\npeak_nm=3", false),
+    ] {
+        let found = FaultyPlant::new(&arm, &effects(&[table]), &PlantConfig::default());
+        assert_eq!(found.is_err(), is_refused, "{table}");
+    }
     let driving = plant(&["kind='stribeck'\njoint=1\nextra_nm=-20\nvs_rad_s=1"]);
     assert!(matches!(driving, Err(PlantError::FrictionDrives { joint: 1, .. })));
     let stiff = plant(&["kind='elasticity'\njoint=6\nstiffness_nm_rad=1e9"]).unwrap();

@@ -14,6 +14,8 @@ pub type Terms = Vec<(usize, f64)>;
 /// Its parameters p̃ (k of them) span the standard ones, p = L p̃, so that its regressor is Θ L.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameterisation {
+    /// Order of the standard parameters.
+    pub layout: ParameterLayout,
     /// Name of each parameter.
     pub names: Vec<String>,
     /// SI unit of each parameter.
@@ -78,6 +80,7 @@ impl Parameterisation {
         let count = if with_offsets { layout.count() } else { layout.count_without_offsets() };
         let unit_terms: Vec<Terms> = (0..count).map(|k| vec![(k, 1.0)]).collect();
         Self {
+            layout,
             names: (0..count).map(|k| layout.name(k)).collect(),
             units: (0..count).map(|k| layout.unit(k)).collect(),
             to_standard: unit_terms.clone(),
@@ -111,6 +114,7 @@ impl Parameterisation {
         let frames = paper_frames(arm)?;
         let layout = ParameterLayout::new(PAPER_DOF);
         let mut set = Self {
+            layout,
             names: Vec::new(),
             units: Vec::new(),
             to_standard: Vec::new(),

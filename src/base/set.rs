@@ -169,10 +169,11 @@ impl BaseSet {
         &self.parameterisation.names[self.independent[k]]
     }
 
-    /// The base parameter whose kept column is `parameter`; `None` if there is none.
+    /// The base parameter whose kept column is that of the standard parameter `parameter`; `None` if there is none. A
+    /// parameter of a reduced set may have the same name and refer to another frame: that one is not meant.
     pub fn index_of(&self, parameter: Parameter) -> Option<usize> {
-        let name = parameter.to_string();
-        (0..self.rank()).find(|&k| self.name(k) == name)
+        let column = [(self.parameterisation.layout.index(parameter), 1.0)];
+        (0..self.rank()).find(|&k| *self.column(k) == column)
     }
 
     /// SI unit of base parameter `k`.
@@ -280,6 +281,24 @@ mod tests {
             assert_eq!(set.rank(), 53);
             assert!((0..53).any(|k| set.name(k) == found.column), "{found}");
         }
+    }
+
+    /// The z axis of the paper's frame 2 is another one than that of the joint frame, so that its mz2 is another
+    /// parameter. Drives have no frame.
+    #[test]
+    fn a_parameter_in_another_frame_is_not_found_by_its_name() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let layout = ParameterLayout::new(6);
+        let full = BaseSet::find(&arm, Parameterisation::full(6, false)).unwrap();
+        for k in 0..full.rank() {
+            let (standard, _) = full.column(k)[0];
+            assert_eq!(full.index_of(layout.parameter(standard)), Some(k));
+        }
+        let paper = BaseSet::find(&arm, Parameterisation::paper(&arm).unwrap()).unwrap();
+        assert!((0..paper.rank()).any(|k| paper.name(k) == "mz2"));
+        assert_eq!(paper.index_of(Parameter::Body(1, 3)), None);
+        let viscous = paper.index_of(Parameter::Viscous(5)).unwrap();
+        assert_eq!(paper.name(viscous), "rv6");
     }
 
     #[test]

@@ -127,7 +127,7 @@ pub struct ExciteArgs {
         allow_negative_numbers = true
     )]
     seconds: f64,
-    /// Threads; default: all cores. The result does not depend on it.
+    /// Threads, at most four per core; default: all cores. The result does not depend on it.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     /// Trajectory file; a scenario for `simulate` and `montecarlo` names it as `[motion] trajectory`.

@@ -99,7 +99,7 @@ fn write_urdf(
         return Ok(());
     };
     let name = own.display().to_string();
-    let OwnUrdf { text, takeovers, relative_mesh } = own_urdf(text, &name, arm, urdf_links)?;
+    let OwnUrdf { text, rescalings, relative_mesh } = own_urdf(text, &name, arm, urdf_links)?;
     write_text(path, &text)?;
     let end = if arm.dof() == 1 { "" } else { "s" };
     say!(
@@ -107,8 +107,8 @@ fn write_urdf(
         path.display(),
         dof = arm.dof()
     );
-    for takeover in takeovers {
-        say!("note: {takeover}");
+    for rescaling in rescalings {
+        say!("note: {rescaling}");
     }
     if let Some(mesh) = relative_mesh.filter(|_| folder(path) != folder(own)) {
         say!(

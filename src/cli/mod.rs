@@ -79,12 +79,13 @@ fn simulating(scenario: &Scenario) -> String {
     format!("simulating a log of {duration_s:.0} s of {} in rapier …", scenario.arm.name)
 }
 
-/// Number of threads asked for, or one per core.
+/// Largest number of threads per core: more would finish nothing sooner, and each takes memory of its own.
+const THREADS_PER_CORE: usize = 4;
+
+/// Number of threads asked for, as far as the cores can use them, or one per core.
 fn threads_or_all(asked: Option<u16>) -> usize {
-    match asked {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    }
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    asked.map_or(cores, |threads| usize::from(threads).min(THREADS_PER_CORE * cores))
 }
 
 /// Progress of long work: a bar on a terminal, otherwise an occasional plain line.
@@ -144,4 +145,16 @@ pub fn interrupt_flag() -> &'static std::sync::atomic::AtomicBool {
         });
     });
     &FLAG
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_threads_are_started_than_the_cores_can_use() {
+        let cores = threads_or_all(None);
+        assert_eq!(threads_or_all(Some(1)), 1);
+        assert_eq!(threads_or_all(Some(u16::MAX)), THREADS_PER_CORE * cores);
+    }
 }

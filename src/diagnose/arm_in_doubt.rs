@@ -30,12 +30,16 @@ impl Diagnoser<'_> {
     }
 }
 
-/// Share of each joint's rms torque that is left unexplained beside the causes, with the known noise subtracted.
+/// Share of each joint's rms torque that is left unexplained beside the causes, with the known noise subtracted. It is
+/// no more than the model leaves without them: coarse angles, differentiated at all harmonics, may roughen what is left
+/// in the same way in every period.
 fn share_left(diagnosis: &Diagnosis, identification: &Identification) -> Vec<f64> {
-    let torque_nm = identification.residual().torque_rms_nm;
+    let residual = identification.residual();
+    let (torque_nm, percent) = (residual.torque_rms_nm, residual.relative_percent);
     let share = |j: usize| {
         let noise_nm = diagnosis.noise_of_mean_nm.as_ref().map_or(0.0, |nm| nm[j]);
-        (diagnosis.after.rms_nm[j].powi(2) - noise_nm.powi(2)).max(0.0).sqrt() / torque_nm[j]
+        let left_nm = (diagnosis.after.rms_nm[j].powi(2) - noise_nm.powi(2)).max(0.0).sqrt();
+        (left_nm / torque_nm[j]).min(0.01 * percent[j])
     };
     (0..torque_nm.len()).map(share).collect()
 }

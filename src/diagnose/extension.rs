@@ -50,6 +50,25 @@ pub(super) fn width_of_arm(
     of_arm.coefficients.first().copied()
 }
 
+/// Torque of the drive per torque that the log shows of `effect`: 1/(1 + e) where `effects` hold an error e of the torque
+/// constant of its joint, and 1 elsewhere. The column of that error holds the torque of the rigid arm and its friction
+/// alone, so that the coefficients of other effects are those of the reading.
+pub(super) fn torque_per_reading(
+    effects: &[Effect],
+    effect: &Effect,
+    families: &[Box<dyn Candidate>],
+) -> f64 {
+    let kind = |effect: &Effect| families[effect.family].kind();
+    // These are faults of the reading itself.
+    let is_read = matches!(kind(effect), Kind::TorqueGain | Kind::CurrentOffset | Kind::Saturation);
+    if is_read || effect.site.is_none() {
+        return 1.0;
+    }
+    let is_gain = |other: &&Effect| kind(other) == Kind::TorqueGain && other.site == effect.site;
+    let error = effects.iter().find(is_gain).and_then(|gain| gain.coefficients.first());
+    error.map_or(1.0, |e| 1.0 / (1.0 + e))
+}
+
 /// Standard deviation of the coefficients of [`Candidate::loose`] relative to that of the law, before any log is seen.
 ///
 /// The directions are differences to other drives and flanks that are listed as extremes, so that most arms are within

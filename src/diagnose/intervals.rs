@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::candidates::Candidate;
 use super::candidates::{Quantity, Search, Shape};
 use super::delta_method::with_reach;
-use super::extension::{Effect, Extension, width_of_arm};
+use super::extension::{Effect, Extension, torque_per_reading, width_of_arm};
 use super::image::{Image, Span};
 use super::kind::Kind;
 use super::selection::Kept;
@@ -131,11 +131,13 @@ pub fn physical(
     let tangents = Tangents::outside(study, &others, effect);
     let quantile = study.statistic.quantile_95(&tangents.span, &residual);
     let has_profile = study.scene.periodic && has_nonlinear_parameter(study, effect);
-    let profile = Profile { study, effect, others: &others, residual: &residual, quantile };
-    let mut out = has_profile
-        .then(|| profile.intervals(&tangents))
-        .flatten()
-        .unwrap_or_else(|| of_one_form(study, effect, (&tangents, &residual), quantile));
+    let per_reading = torque_per_reading(effects, effect, study.families);
+    let profile =
+        Profile { study, effect, per_reading, others: &others, residual: &residual, quantile };
+    let mut out =
+        has_profile.then(|| profile.intervals(&tangents)).flatten().unwrap_or_else(|| {
+            of_one_form(study, (effect, per_reading), (&tangents, &residual), quantile)
+        });
     for form in kept.other_forms(index, (&others, &residual)) {
         let left = 1.0 - form.behind / quantile.powi(2);
         if left <= 0.0 {
@@ -143,7 +145,8 @@ pub fn physical(
         }
         let tangents = Tangents::outside(study, &others, &form.effect);
         let half = left.sqrt() * quantile;
-        let other = of_one_form(study, &form.effect, (&tangents, &residual), half);
+        let form = (&form.effect, per_reading);
+        let other = of_one_form(study, form, (&tangents, &residual), half);
         // A form with the opposite sign bends the other way where this matters less; it is a different statement. The
         // sign of a phase states nothing.
         let is_opposite = |(name, own): (&&str, &Estimate)| {
@@ -161,7 +164,8 @@ pub fn physical(
         own.reach(again.value);
     }
     let Effect { site, shape, coefficients, .. } = effect;
-    for (name, ends) in family.left_open(&study.scene, *site, *shape, coefficients) {
+    let of_drive: Vec<f64> = coefficients.iter().map(|b| per_reading * b).collect();
+    for (name, ends) in family.left_open(&study.scene, *site, *shape, &of_drive) {
         let own = out.get_mut(name).into_iter();
         own.for_each(|own| ends.into_iter().for_each(|end| own.reach(end)));
     }
@@ -203,6 +207,8 @@ fn reach_over(own: &mut BTreeMap<&'static str, Estimate>, other: &BTreeMap<&str,
 struct Profile<'a> {
     study: &'a Study<'a>,
     effect: &'a Effect,
+    /// [`torque_per_reading`] of the effect.
+    per_reading: f64,
     others: &'a Span,
     residual: &'a Image,
     quantile: f64,
@@ -293,7 +299,9 @@ impl Profile<'_> {
             ..self.effect.clone()
         };
         let free = (0..span.len()).collect();
-        of_one_form(self.study, &effect, (&Tangents { span, free }, self.residual), half)
+        let tangents = Tangents { span, free };
+        let effect = (&effect, self.per_reading);
+        of_one_form(self.study, effect, (&tangents, self.residual), half)
     }
 }
 
@@ -332,10 +340,10 @@ impl Tangents {
 }
 
 /// Parameters of one form by the [delta method](with_reach), with intervals of ± `half` σ, where the coefficients of the
-/// other causes are free.
+/// other causes are free. The effect has its [`torque_per_reading`], whose own error is a small part of any interval.
 fn of_one_form(
     study: &Study,
-    effect: &Effect,
+    (effect, per_reading): (&Effect, f64),
     (tangents, residual): (&Tangents, &Image),
     half: f64,
 ) -> BTreeMap<&'static str, Estimate> {
@@ -344,7 +352,8 @@ fn of_one_form(
     let k = effect.coefficients.len();
     let at = |numbers: &[f64]| -> Vec<Quantity> {
         let shape = Shape { value: numbers[k], ..effect.shape };
-        family.quantities(&study.scene, effect.site, shape, &numbers[..k])
+        let of_drive: Vec<f64> = numbers[..k].iter().map(|b| per_reading * b).collect();
+        family.quantities(&study.scene, effect.site, shape, &of_drive)
     };
     let numbers = [&effect.coefficients[..], &[effect.shape.value]].concat();
     let estimate = |(quantity, reach): (Quantity, f64)| {

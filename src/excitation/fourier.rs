@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{ExcitationError, positive};
 use super::reference::Reference;
+use crate::input::read_text;
 use crate::robot::JointSignals;
 
 /// Schema of trajectory files.
@@ -150,13 +151,15 @@ impl FourierSeries {
         if extension.is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
             return Self::built_in(name_or_path);
         }
-        let text = std::fs::read_to_string(name_or_path)
+        let text = read_text(name_or_path)
             .map_err(|source| ExcitationError::File { file: name_or_path.to_owned(), source })?;
         Self::from_json(&text, name_or_path)
     }
 
     /// Parses the text of a trajectory file; `source` names it in messages.
     pub fn from_json(text: &str, source: &str) -> Result<Self, ExcitationError> {
+        // Some editors put a byte order mark in front.
+        let text = text.trim_start_matches('\u{feff}');
         let json = |e: serde_json::Error| ExcitationError::Json {
             file: source.to_owned(),
             message: e.to_string(),
@@ -352,6 +355,8 @@ mod tests {
     fn a_file_read_back_is_bit_for_bit_the_same_series() {
         let series = two_joints();
         assert_eq!(FourierSeries::from_json(&series.to_json(), "x").unwrap(), series);
+        let marked = format!("\u{feff}{}", series.to_json());
+        assert_eq!(FourierSeries::from_json(&marked, "x").unwrap(), series);
     }
 
     fn message_after(from: &str, to: &str) -> String {

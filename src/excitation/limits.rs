@@ -162,6 +162,15 @@ impl Margins {
         // An arm has at least one joint, so there are at least four margins.
         self.all.iter().min_by(|a, b| a.share.total_cmp(&b.share)).unwrap_or(&self.all[0])
     }
+
+    /// The margins of the motion with more of the same inserted at the time `at_s`: what came after it comes `by_s`
+    /// later.
+    pub(super) fn prolonged(mut self, at_s: f64, by_s: f64) -> Self {
+        for margin in self.all.iter_mut().filter(|margin| margin.time_s > at_s) {
+            margin.time_s += by_s;
+        }
+        self
+    }
 }
 
 /// Follows `motion` from start to end at `requirements.check_rate_hz` and returns its margins.

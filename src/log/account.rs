@@ -109,6 +109,13 @@ pub enum LogWarning {
         /// Rows per second.
         rate_hz: f64,
     },
+    /// Time stamps say when a row arrived; evenly sampled rows are put on the straight line through their stamps.
+    ArrivalStamps {
+        /// Scatter of the stamps about the line (rms), s.
+        rms_s: f64,
+        /// Rows per second.
+        rate_hz: f64,
+    },
     /// The recorder held rows back and wrote them in bursts, stamped with the time of writing; they are spaced evenly
     /// instead.
     LateBursts {
@@ -212,6 +219,12 @@ impl fmt::Display for LogWarning {
                 "time stamps are rounded to {resolution_s:.4} s: rows are taken to be evenly apart, {rate_hz:.3} a second, as the motion \
                  says that they are"
             ),
+            Self::ArrivalStamps { rms_s, rate_hz } => write!(
+                f,
+                "time stamps scatter by {:.2} ms (rms), as times of arrival do: rows are taken to be evenly apart, {rate_hz:.3} a second, as the \
+                 motion says that they are",
+                1e3 * rms_s
+            ),
             Self::LateBursts { rows, bursts, after_row, latest_s } => write!(
                 f,
                 "the recorder wrote rows late in bursts, by up to {:.1} ms (rows: {rows}, bursts: {bursts}, the first after row \
@@ -229,8 +242,8 @@ impl fmt::Display for LogWarning {
             ),
             Self::PositionJumps { count, after_row, joint, jump_rad } => write!(
                 f,
-                "the position jumps {count} times; first after row {after_row}, joint {joint} by \
-                 {jump_rad:.3} rad"
+                "the position jumps {count} times; first after row {after_row}, joint {joint} by {jump_rad:.3} rad: if another recording begins there, \
+                 split the file"
             ),
             Self::Unwrapped { count, after_row, joint } => write!(
                 f,

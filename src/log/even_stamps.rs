@@ -42,8 +42,8 @@ pub(super) struct EvenStamps {
 /// Returns even stamps for rows whose own stamps are rounded; `None` if they are not rounded, or if rounding alone does
 /// not explain them.
 pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
-    let (time_s, rows) = (motion.time_s, motion.row);
-    let (first_s, first_row) = (*time_s.first()?, *rows.first()?);
+    let time_s = motion.time_s;
+    let first_s = *time_s.first()?;
     if time_s.len() < FEWEST_ROWS {
         return None;
     }
@@ -58,27 +58,51 @@ pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
     if !is_coarse || !time_s.iter().all(is_on_grid) {
         return None;
     }
-    // Rows that were set aside still have their place in the file.
-    let place: Vec<f64> = rows.iter().map(|row| row.abs_diff(first_row) as f64).collect();
+    let StampLine { even_s: even, step_s, off_s } = StampLine::through(motion)?;
     let count = time_s.len() as f64;
-    let middle = place.iter().sum::<f64>() / count;
-    let mean_s = first_s + time_s.iter().map(|t| t - first_s).sum::<f64>() / count;
-    let square: f64 = place.iter().map(|k| (k - middle).powi(2)).sum();
-    let product: f64 = place.iter().zip(time_s).map(|(k, t)| (k - middle) * (t - mean_s)).sum();
-    let step_s = product / square;
-    let even: Vec<f64> = place.iter().map(|k| mean_s + (k - middle) * step_s).collect();
-    let off_s: Vec<f64> = time_s.iter().zip(&even).map(|(t, even)| t - even).collect();
     let ends = |[low, high]: [f64; 2], off: &f64| [low.min(*off), high.max(*off)];
     let [low, high] = off_s.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
     let rms_s = (off_s.iter().map(|off| off * off).sum::<f64>() / count).sqrt();
     let is_rounded =
         high - low <= WITHIN_STEPS * resolution_s && rms_s >= LEAST_RMS_STEPS * resolution_s;
-    if step_s.is_nan() || step_s <= 0.0 || !is_rounded {
+    if !is_rounded {
         return None;
     }
     let on_the_line = Motion { time_s: &even, ..*motion };
     let is_better = defect(&on_the_line) < BETTER * defect(motion);
     is_better.then(|| EvenStamps { resolution_s, rate_hz: 1.0 / step_s, time_s: even })
+}
+
+/// The straight line through the stamps of all rows, by their places in the file.
+pub(super) struct StampLine {
+    /// The line at each row, s.
+    pub(super) even_s: Vec<f64>,
+    /// Its slope: the time between two rows, s.
+    pub(super) step_s: f64,
+    /// Stamp of each row minus the line, s.
+    pub(super) off_s: Vec<f64>,
+}
+
+impl StampLine {
+    /// The line of least squares; `None` if time does not pass along it.
+    pub(super) fn through(motion: &Motion) -> Option<Self> {
+        let (time_s, rows) = (motion.time_s, motion.row);
+        let (first_s, first_row) = (*time_s.first()?, *rows.first()?);
+        // Rows that were set aside still have their place in the file.
+        let place: Vec<f64> = rows.iter().map(|row| row.abs_diff(first_row) as f64).collect();
+        let count = time_s.len() as f64;
+        let middle = place.iter().sum::<f64>() / count;
+        let mean_s = first_s + time_s.iter().map(|t| t - first_s).sum::<f64>() / count;
+        let square: f64 = place.iter().map(|k| (k - middle).powi(2)).sum();
+        let product: f64 = place.iter().zip(time_s).map(|(k, t)| (k - middle) * (t - mean_s)).sum();
+        let step_s = product / square;
+        if step_s.is_nan() || step_s <= 0.0 {
+            return None;
+        }
+        let even_s: Vec<f64> = place.iter().map(|k| mean_s + (k - middle) * step_s).collect();
+        let off_s = time_s.iter().zip(&even_s).map(|(t, even)| t - even).collect();
+        Some(Self { even_s, step_s, off_s })
+    }
 }
 
 /// The mismatch that the fraction [`TELLING`] of the rows does not exceed, rad (see [`row_defect`]).

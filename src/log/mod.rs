@@ -6,6 +6,7 @@
 //! or a [`LogError`] that names file, row and value.
 
 mod account;
+mod arrival_stamps;
 mod clean;
 mod counting;
 mod error;

@@ -30,7 +30,7 @@ const WIDTH_ROWS: usize = 50;
 ///    effort contain an empty field, text, NaN, an infinity, or a magnitude beyond these bounds: angle and velocity
 ///    3.6·10⁵, acceleration 3·10⁴ rad/s², current 500 A, torque 5·10⁴ Nm, temperature 1000 °C, time 10¹⁹ s.
 /// 2. Time stamps rounded more coarsely than half the sampling interval are replaced by the straight line through them,
-///    if the motion shows that the rows were sampled evenly. Rows that were held back and written in one burst are
+///    if the motion shows that the rows were sampled evenly, and so are stamps that scatter. Rows that were held back and written in one burst are
 ///    spread evenly between the row before and the row after, unless the motion shows that they were really sampled
 ///    that late. Then times must increase: repeated and backward times are set aside, and so are up to 8 consecutive
 ///    rows whose time is far ahead.

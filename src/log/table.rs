@@ -1,6 +1,7 @@
 //! The numbers of a log while it is read, column by column.
 
 use super::account::{LogWarning, Reason, RowAccount};
+use super::arrival_stamps::arrival_stamps;
 use super::clean;
 use super::error::LogError;
 use super::even_stamps::{EvenStamps, even_stamps};
@@ -167,15 +168,15 @@ impl Table {
         }
     }
 
-    /// Repairs rounded or late time stamps where the motion contradicts them; returns the warning that reports the
-    /// repair.
+    /// Repairs time stamps that are rounded, scatter or are late where the motion contradicts them; returns the warning
+    /// that reports the repair.
     fn restamp(&mut self, plan: &Plan) -> Option<LogWarning> {
         let motion = self.motion(plan);
         let (time_s, warning) = match even_stamps(&motion) {
             Some(EvenStamps { time_s, resolution_s, rate_hz }) => {
                 (time_s, LogWarning::RoundedStamps { resolution_s, rate_hz })
             }
-            None => late_bursts(&motion)?,
+            None => arrival_stamps(&motion).or_else(|| late_bursts(&motion))?,
         };
         let (time, ..) = motion_ranges(plan);
         self.columns[time] = time_s;

@@ -11,6 +11,7 @@ use crate::base::{BaseSet, Parameterisation, ParameterisationError};
 use crate::excitation::design::LONGEST_S;
 use crate::excitation::{Excitation, ExcitationError, FourierSeries, Requirements};
 use crate::identify::{Improper, Options};
+use crate::input::read_text;
 use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{PlantConfig, PlantError, SensorConfig, Sensors};
 use crate::robot::{Arm, LoadedArm, RobotError};
@@ -324,7 +325,7 @@ impl Source {
             let name = "sims/default.toml".to_owned();
             return Ok(Self { text: DEFAULT.to_owned(), name, folder: PathBuf::new() });
         };
-        let text = std::fs::read_to_string(path)
+        let text = read_text(path)
             .map_err(|source| ScenarioError::Read { file: path.to_owned(), source })?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self { text, name: path.display().to_string(), folder })

@@ -1,5 +1,6 @@
 //! JSON documents that name the program, the command and the inputs of a result.
 
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -58,15 +59,17 @@ impl Program {
         seed: Option<u64>,
         inputs: Vec<Input>,
     ) -> Self {
-        let mut words: Vec<String> =
-            command.into_iter().map(|word| quoted(word.as_ref())).collect();
-        if let Some(program) = words.first_mut()
-            && let Some((_, name)) = program.rsplit_once('/')
-        {
-            *program = name.to_owned();
-        }
+        let mut words = command.into_iter();
+        let program = words.next().map(|word| quoted(name_of(word.as_ref())));
+        let rest = words.map(|word| quoted(word.as_ref()));
+        let words: Vec<String> = program.into_iter().chain(rest).collect();
         Self { version: env!("CARGO_PKG_VERSION").into(), command: words.join(" "), seed, inputs }
     }
+}
+
+/// The name of a file without its folder.
+fn name_of(path: &str) -> &str {
+    Path::new(path).file_name().and_then(OsStr::to_str).unwrap_or(path)
 }
 
 /// A word of a command line, quoted for a shell if necessary.
@@ -145,6 +148,19 @@ mod tests {
         assert_eq!(value["sigma"], serde_json::json!([1.5, null, null]));
         assert!(value["period_s"].is_null());
         assert!(text.starts_with("{\n  \"schema\"") && text.ends_with("}\n"));
+    }
+
+    #[test]
+    fn the_program_is_named_without_its_folder() {
+        for (program, name) in [
+            ("/usr/bin/armid", "armid"),
+            ("sp ace/armid", "armid"),
+            ("bin/my armid", "'my armid'"),
+            ("armid", "armid"),
+        ] {
+            let command = Program::new([program, "logs/my log.csv"], None, Vec::new()).command;
+            assert_eq!(command, format!("{name} 'logs/my log.csv'"));
+        }
     }
 
     #[test]

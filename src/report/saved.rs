@@ -6,6 +6,8 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use thiserror::Error;
 
+use crate::input::read_text;
+
 /// A file that is not a document of the expected schema.
 #[derive(Debug, Error)]
 #[error("{file}: {fault}")]
@@ -45,12 +47,14 @@ struct Head {
 /// Errors: the file cannot be read, is not JSON, has a different schema, or lacks a field of `T`.
 pub fn load<T: DeserializeOwned>(path: &Path, schema: &'static str) -> Result<T, SavedError> {
     let read = || -> Result<T, SavedFault> {
-        let text = std::fs::read_to_string(path)?;
-        let Head { schema: found } = serde_json::from_str(&text)?;
+        let text = read_text(path)?;
+        // Some editors put a byte order mark in front.
+        let text = text.trim_start_matches('\u{feff}');
+        let Head { schema: found } = serde_json::from_str(text)?;
         if found != schema {
             return Err(SavedFault::OtherSchema { found, expected: schema });
         }
-        Ok(serde_json::from_str(&text)?)
+        Ok(serde_json::from_str(text)?)
     };
     read().map_err(|fault| SavedError { file: path.display().to_string(), fault })
 }
@@ -81,5 +85,6 @@ mod tests {
         assert!(error.contains("missing field `sigma`"), "{error}");
         assert!(loaded("{}").unwrap_err().contains("missing field `schema`"));
         assert!(loaded("").unwrap_err().contains("EOF"));
+        assert_eq!(loaded("\u{feff}{\"schema\": \"armid.sigma/2\", \"sigma\": 0.5}"), Ok(0.5));
     }
 }

@@ -53,6 +53,8 @@ pub struct Joint {
 /// they would look known to whoever reads them. (A URDF has to have a speed limit, and has the assumed one.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Assumed {
+    /// The range of positions: the joint has no end stops.
+    pub position: bool,
     /// The gear ratio.
     pub gear_ratio: bool,
     /// The torque constant.

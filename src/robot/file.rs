@@ -140,6 +140,13 @@ impl RobotFile {
         if self.joints.is_empty() {
             return Err(place.fault("it has no [[joint]]"));
         }
+        if self.name.is_empty() {
+            return Err(place.fault("name is empty; results and other files know the robot by it"));
+        }
+        place.plain_name("robot", &self.name)?;
+        for joint in &self.joints {
+            place.plain_name("joint", &joint.name)?;
+        }
         place.finite("gravity_m_s2", &self.gravity_m_s2)?;
         place.positive("friction_epsilon_rad_s", self.friction_epsilon_rad_s)?;
         place.unique("joint", self.joints.iter().map(|joint| joint.name.as_str()))?;
@@ -321,6 +328,23 @@ mod tests {
         let negative = message("[-2.0, -1.0]").unwrap_err();
         assert!(negative.contains("mass_bounds_kg = -2 must not be negative"), "{negative}");
         assert!(message("[4.0, 3.0]").unwrap_err().contains("must be [low, high]"));
+    }
+
+    #[test]
+    fn names_that_no_other_file_can_hold_are_refused() {
+        let message = |from: &str, to: &str| {
+            let text = include_str!("../../robots/ur5.toml");
+            assert!(text.contains(from), "{from}");
+            Arm::from_toml(&text.replacen(from, to, 1), "x.toml").unwrap_err().to_string()
+        };
+        let nameless = message("name = \"ur5\"", "name = \"\"");
+        assert!(nameless.starts_with("x.toml: name is empty"), "{nameless}");
+        let robot = message("name = \"ur5\"", "name = \"ur\\t5\"");
+        assert!(robot.contains("x.toml: the name of the robot \"ur\\t5\" has a"), "{robot}");
+        let joint = message("name = \"elbow\"", "name = \"el\\u0001\\nbow\"");
+        assert!(joint.contains("joint \"el\\u{1}\\nbow\" has a control character"), "{joint}");
+        let capsule = message("name = \"wrist 3\"", "name = \"wrist\\n3\"");
+        assert!(capsule.contains("capsule \"wrist\\n3\" has a control"), "{capsule}");
     }
 
     #[test]

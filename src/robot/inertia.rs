@@ -106,6 +106,11 @@ impl LinkInertia {
         Self { parameters: std::array::from_fn(|k| self.parameters[k] + other.parameters[k]) }
     }
 
+    /// The body of the same shape with `factor` times the mass.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self { parameters: self.parameters.map(|parameter| factor * parameter) }
+    }
+
     /// The remainder of the body without `part`, both about the same frame.
     pub fn minus(&self, part: &Self) -> Self {
         Self { parameters: std::array::from_fn(|k| self.parameters[k] - part.parameters[k]) }

@@ -1,10 +1,11 @@
-//! Checks of the numbers in files that describe an arm.
+//! Checks of the names and numbers in files that describe an arm.
 
 use std::collections::HashSet;
 use std::fmt::Display;
 
 use super::arm::LinkBounds;
 use super::error::RobotError;
+use super::urdf::plain_name;
 
 /// A place in a file, which error messages name.
 #[derive(Debug)]
@@ -28,6 +29,11 @@ impl Place {
     /// An error at this place.
     pub(super) fn fault(&self, what: impl Display) -> RobotError {
         RobotError::Invalid { file: self.file.clone(), what: format!("{}{what}", self.table) }
+    }
+
+    /// Refuses a `name` with control characters.
+    pub(super) fn plain_name(&self, kind: &'static str, name: &str) -> Result<(), RobotError> {
+        plain_name(kind, name).map_err(|fault| self.fault(fault))
     }
 
     /// Refuses NaN and infinite values.

@@ -2,7 +2,7 @@
 
 use super::counterpart::{Counterpart, DiagnosedCause};
 use crate::diagnose::candidates::Candidate;
-use crate::diagnose::extension::width_of_arm;
+use crate::diagnose::extension::{torque_per_reading, width_of_arm};
 use crate::diagnose::{Effect, Kind, Scene};
 
 /// A fitted effect and its counterpart.
@@ -29,7 +29,9 @@ impl<'e> Fitted<'e> {
             effects.iter().partition(|effect| of_arm(effect).is_some());
         let fitted = |effect: &'e Effect| {
             let added = of_arm(effect).unwrap_or(0.0);
-            let b: Vec<f64> = effect.coefficients.iter().map(|own| own + added).collect();
+            let per_reading = torque_per_reading(effects, effect, families);
+            let b: Vec<f64> =
+                effect.coefficients.iter().map(|own| per_reading * own + added).collect();
             Self::new(effect, &b, families, scene)
         };
         first.into_iter().chain(behind).map(fitted).collect()

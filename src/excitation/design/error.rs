@@ -67,8 +67,9 @@ pub enum DesignError {
     },
     /// None of the starts became a motion inside the limits.
     #[error(
-        "no motion inside the limits was found from {starts} starts: ask for less --clearance ({clearance_m} m) or a longer \
-         --period, allow more of the limits (--velocity-share, --torque-share), or look at the limits of \"{arm}\""
+        "no motion inside the limits was found from {starts} starts: ask for less --clearance ({clearance_m} m) or another \
+         --period (speeds and accelerations limit short ones, the ranges of the joints long ones), allow more of the limits \
+         (--velocity-share, --torque-share), or look at the limits of \"{arm}\""
     )]
     Infeasible {
         /// How many were tried.

@@ -44,7 +44,7 @@ pub struct Point {
     pub torque_barrier: f64,
     /// ∂(f + μψ)/∂x.
     pub gradient: DVector<f64>,
-    /// φ and its derivatives.
+    /// φ, and what its curvature needs.
     pub terms: BarrierTerms,
     /// ∂φ/∂x.
     pub barrier_gradient: DVector<f64>,
@@ -64,6 +64,7 @@ pub struct ProblemWorkspace {
     barrier: BarrierWorkspace,
     torque_nm: Vec<f64>,
     torque_bar: Vec<f64>,
+    motion: Motion,
     bar: Motion,
 }
 
@@ -73,9 +74,10 @@ impl Problem {
         let (n, samples) = (self.space.joints(), self.space.samples());
         ProblemWorkspace {
             information: self.information.workspace(samples),
-            barrier: self.barrier.workspace(),
+            barrier: self.barrier.workspace(samples),
             torque_nm: vec![0.0; n * samples],
             torque_bar: vec![0.0; n * samples],
+            motion: Motion::at_rest(n, samples),
             bar: Motion::at_rest(n, samples),
         }
     }
@@ -89,12 +91,12 @@ impl Problem {
         mu: f64,
         sharpness: f64,
     ) -> Option<Point> {
-        let (n, samples) = (self.space.joints(), self.space.samples());
-        let mut motion = Motion::at_rest(n, samples);
-        self.space.motion(x.as_slice(), &mut motion);
-        let terms = self.barrier.evaluate(&mut ws.barrier, &self.space, x.as_slice(), &motion)?;
+        let samples = self.space.samples();
+        let motion = &mut ws.motion;
+        self.space.motion(x.as_slice(), motion);
+        let terms = self.barrier.evaluate(&mut ws.barrier, &self.space, x.as_slice(), motion)?;
         let mut information =
-            self.information.evaluate(&mut ws.information, &motion, &mut ws.torque_nm);
+            self.information.evaluate(&mut ws.information, motion, &mut ws.torque_nm);
         let mut torque_barrier = 0.0;
         for (joint, limit) in self.torque_nm.iter().enumerate() {
             let range = joint * samples..(joint + 1) * samples;
@@ -118,22 +120,28 @@ impl Problem {
         if !smooth.is_finite() {
             return None;
         }
-        self.information.pull_back(&mut ws.information, &motion, &g, &ws.torque_bar, &mut ws.bar);
+        self.information.pull_back(&mut ws.information, motion, &g, &ws.torque_bar, &mut ws.bar);
         let mut gradient = DVector::zeros(x.len());
-        self.space.pull_back(x.as_slice(), &motion, &ws.bar, gradient.as_mut_slice());
+        self.space.pull_back(x.as_slice(), motion, &ws.bar, gradient.as_mut_slice());
         let mut barrier_gradient = DVector::zeros(x.len());
-        self.space.pull_back(x.as_slice(), &motion, &terms.bar, barrier_gradient.as_mut_slice());
+        self.space.pull_back(
+            x.as_slice(),
+            motion,
+            &ws.barrier.bar,
+            barrier_gradient.as_mut_slice(),
+        );
         if let Some(at) = self.space.log_period_at() {
             barrier_gradient[at] += terms.period_slope;
         }
+        let motion = motion.clone();
         Some(Point { x, motion, smooth, torque_barrier, gradient, terms, barrier_gradient })
     }
 
     /// Λ + Λ_prior at x, whether x is feasible or not.
     pub fn total_information(&self, ws: &mut ProblemWorkspace, x: &DVector<f64>) -> Mat<f64> {
-        self.space.motion(x.as_slice(), &mut ws.bar);
+        self.space.motion(x.as_slice(), &mut ws.motion);
         let mut information =
-            self.information.evaluate(&mut ws.information, &ws.bar, &mut ws.torque_nm);
+            self.information.evaluate(&mut ws.information, &ws.motion, &mut ws.torque_nm);
         if let Some(prior) = &self.prior {
             information += prior;
         }

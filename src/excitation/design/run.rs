@@ -275,6 +275,10 @@ fn finish(
     Err(failure)
 }
 
+/// Largest number of periods along which a whole motion is checked: they are all alike, and more of them take time
+/// only.
+const CHECKED_PERIODS: usize = 32;
+
 /// The motion of `periods` periods of `series` with run-in and run-out, or the reason why it cannot be played. The
 /// run-in was chosen with one period, so that the instants at which the whole is checked lie elsewhere in the period.
 fn whole_motion(
@@ -285,7 +289,10 @@ fn whole_motion(
 ) -> Result<(Excitation, Margins), String> {
     let excitation =
         Excitation::fitted(arm, requirements, series, periods, true).map_err(|e| e.to_string())?;
-    let margins = check(arm, requirements, &excitation).map_err(|e| e.to_string())?;
+    let checked = excitation.clone().with_periods(periods.min(CHECKED_PERIODS));
+    let margins = check(arm, requirements, &checked).map_err(|e| e.to_string())?;
+    let [_, end_s] = checked.periodic_window_s();
+    let margins = margins.prolonged(end_s, excitation.duration_s() - checked.duration_s());
     if margins.feasible() {
         return Ok((excitation, margins));
     }
@@ -339,6 +346,7 @@ fn calm_moments(arm: &Arm, spec: &Specification, series: &FourierSeries) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::excitation::LimitKind;
 
     /// Joint 6 oscillates with a period of 4 s, and its speed reaches `share` of its limit. The run-in is chosen along
     /// a motion of 5 … 12 s, and at one sample in ten seconds that joint is at rest in each of these. Along 25 periods,
@@ -359,5 +367,28 @@ mod tests {
         assert!(excitation.periods() == 25 && margins.feasible());
         let refused = sampled_rarely(1.1).unwrap_err();
         assert!(refused.contains("whole motion") && refused.contains("joint 6"), "{refused}");
+    }
+
+    /// Joint 6 oscillates by 1/2π rad about 1 rad. It is fastest where the periods begin and end, with 1 rad/s, so that
+    /// a run-out of T brings it T/2 farther, at least 0.25 rad: the end of the motion is nearest to its limit of 2π.
+    #[test]
+    fn margins_of_many_periods_have_their_times() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let requirements = Requirements { check_rate_hz: 100.0, ..Requirements::default() };
+        let mut a = vec![vec![0.0]; 6];
+        a[5] = vec![1.0];
+        let q0 = vec![0.0, -1.2, 0.0, -1.5, 0.3, 1.0];
+        let series = FourierSeries::new(1.0, q0, a, vec![vec![0.0]; 6]).unwrap();
+        let periods = 10 * CHECKED_PERIODS;
+        let (excitation, margins) = whole_motion(&arm, &requirements, series, periods).unwrap();
+        assert_eq!(excitation.periods(), periods);
+        let margin = |limit: LimitKind| margins.all().iter().find(|m| m.limit == limit).unwrap();
+        let last = margin(LimitKind::Position { joint: 5 });
+        let free_rad = std::f64::consts::TAU - 1.0 - 0.5 * excitation.run_in_s();
+        assert!((last.free - free_rad).abs() < 1e-12, "{} {free_rad}", last.free);
+        assert!((last.time_s - excitation.duration_s()).abs() < 1e-9, "{}", last.time_s);
+        // The acceleration reaches 2π rad/s² in the periods and at most 1.5 · (1 rad/s)/(0.5 s) in the run-out.
+        let hardest = margin(LimitKind::Acceleration { joint: 5 });
+        assert!(hardest.time_s < excitation.run_in_s() + CHECKED_PERIODS as f64);
     }
 }

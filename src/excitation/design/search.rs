@@ -1,5 +1,6 @@
 //! A search with many starts and fewer and fewer survivors.
 
+use std::f64::consts::{PI, TAU};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -231,11 +232,14 @@ fn random_start(
             let limits = &joint.limits;
             let [low, high] = limits.position_rad;
             // Half a turn either way covers every pose; a wider range only repeats them.
-            let reach = (0.5 * (high - low)).min(std::f64::consts::PI);
+            let reach = (0.5 * (high - low)).min(PI);
             let centre = 0.5 * (high + low);
             series.q0_rad[j] = centre + reach * rng.random_range(-1.0..1.0);
             let order = space.variables().order;
-            let size = limits.velocity_rad_s / (order as f64).sqrt();
+            // Over a long period the joint would cross its range many times at full speed: there the path of the
+            // shorter period of which the amplitude v/ω is the whole range is played more slowly.
+            let crossing_rad_s = TAU / series.period_s * 2.0 * reach;
+            let size = limits.velocity_rad_s.min(crossing_rad_s) / (order as f64).sqrt();
             for l in 0..order {
                 series.a_rad_s[j][l] = size * rng.random_range(-1.0..1.0);
                 series.b_rad_s[j][l] = size * rng.random_range(-1.0..1.0);

@@ -38,7 +38,9 @@ const MOST_SAMPLES: f64 = 1e6;
 const HIGHEST_ORDER: usize = 100;
 /// Largest number of starts; this many take hours.
 const MOST_STARTS: usize = 100_000;
-/// Longest data, s: the whole motion is checked against the limits, which takes minutes for a day.
+/// Smallest and largest torque noise, Nm: beyond that of any drive. Its weights 1/σ² can still be calculated with.
+const NOISE_NM: [f64; 2] = [1e-9, 1e9];
+/// Longest data, s: one day, whose samples fill gigabytes.
 pub const LONGEST_S: f64 = 86_400.0;
 
 impl Specification {
@@ -104,7 +106,13 @@ impl Specification {
         }
         per_joint(arm, "torque noise", self.experiment.torque_noise_nm.len())?;
         for (j, &sigma) in self.experiment.torque_noise_nm.iter().enumerate() {
-            positive(&format!("the torque noise of joint {}", j + 1), sigma)?;
+            let what = format!("the torque noise of joint {}", j + 1);
+            positive(&what, sigma)?;
+            let [least, most] = NOISE_NM;
+            if !(least..=most).contains(&sigma) {
+                let must = format!("in {least:e} … {most:e} Nm");
+                return Err(DesignError::Value { what, value: sigma, must });
+            }
         }
         per_joint(arm, "offsets", v.fixed_offsets_rad.len())?;
         for (j, (offset, joint)) in v.fixed_offsets_rad.iter().zip(&arm.joints).enumerate() {
@@ -204,6 +212,18 @@ mod tests {
         assert_eq!(of(25, 0.408, None), None);
         assert_eq!(of(24, 10.0, Some([0.4, 20.0])), None);
         assert!(of(25, 10.0, Some([0.4, 20.0])).unwrap().contains("at most 24"));
+    }
+
+    #[test]
+    fn noise_that_no_drive_has_is_refused() {
+        let of = |sigma: f64| refused(|spec| spec.experiment.torque_noise_nm[3] = sigma);
+        for sigma in NOISE_NM {
+            assert_eq!(of(sigma), None);
+        }
+        let expected =
+            |value: &str| format!("the torque noise of joint 4 = {value} must be in 1e-9 … 1e9 Nm");
+        assert_eq!(of(1e-300).unwrap(), expected("1.00000e-300"));
+        assert_eq!(of(1e300).unwrap(), expected("1.00000e300"));
     }
 
     #[test]

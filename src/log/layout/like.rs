@@ -7,6 +7,7 @@ use toml::{Table, Value};
 
 use super::fault::LayoutFault;
 use super::{Layout, built_in, is_file};
+use crate::input::read_text;
 use crate::log::error::LogError;
 
 /// Keys that a layout must have, either itself or by inheritance.
@@ -23,7 +24,7 @@ pub(super) fn text_of(name: &str, folder: &Path) -> Result<(String, String), Log
         return Err(LogError::UnknownLayout { name: name.to_owned() });
     }
     let file = folder.join(name).display().to_string();
-    match std::fs::read_to_string(&file) {
+    match read_text(&file) {
         Ok(text) => Ok((text, file)),
         Err(e) => Err(LogError::Layout { file, fault: LayoutFault::Read(e) }),
     }

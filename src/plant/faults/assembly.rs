@@ -99,6 +99,11 @@ impl Assembly {
         )
     }
 
+    /// Reach of the arm: the sum of its link lengths, m.
+    pub(super) fn reach_m(&self) -> f64 {
+        self.arm.joints.iter().map(|joint| joint.placement.translation_m.norm()).sum()
+    }
+
     /// Mechanics of joint `joint`, from 1.
     pub(super) fn joint(&mut self, joint: usize) -> &mut JointMechanics {
         &mut self.joints[joint - 1]

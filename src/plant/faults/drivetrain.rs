@@ -349,7 +349,7 @@ impl Flange {
         Self {
             contacts: assembly.flange_contacts.clone(),
             axes: vec![Default::default(); placements.len()],
-            reach_m: placements.iter().map(|p| p.translation_m.norm()).sum(),
+            reach_m: assembly.reach_m(),
             placements,
         }
     }

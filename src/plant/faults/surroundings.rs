@@ -88,7 +88,11 @@ impl Fault for Contact {
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
         match self.joint {
             Some(joint) => assembly.joint(joint).contacts.push(*self),
-            None => assembly.flange_contacts.push(*self),
+            None => {
+                let has_lever = "needs an arm with lengths if it acts on the flange: give a joint";
+                require(assembly.reach_m() > 0.0, "peak_nm", self.peak_nm, has_lever)?;
+                assembly.flange_contacts.push(*self);
+            }
         }
         Ok(())
     }

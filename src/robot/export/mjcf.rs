@@ -66,17 +66,20 @@ fn write_body(out: &mut String, joint: &Joint, name: &str, depth: usize) {
     let (mass_kg, com, i) = about_com(&joint.link);
     let margin = indent(depth);
     let inertia = [i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]];
+    let range = match joint.assumed.position {
+        true => String::new(),
+        false => format!(" range=\"{}\"", numbers(&joint.limits.position_rad)),
+    };
     let _ = write!(
         out,
         "{margin}<body name=\"{}\" {}>\n{margin}  <inertial pos=\"{}\" mass=\"{mass_kg}\" \
-         fullinertia=\"{}\"/>\n{margin}  <joint name=\"{}\" axis=\"0 0 1\" range=\"{}\" \
+         fullinertia=\"{}\"/>\n{margin}  <joint name=\"{}\" axis=\"0 0 1\"{range} \
          armature=\"{}\" damping=\"{}\" frictionloss=\"{}\"/>\n",
         escaped(name),
         pose(&joint.placement),
         numbers(com.iter()),
         numbers(&inertia),
         escaped(&joint.name),
-        numbers(&joint.limits.position_rad),
         joint.drive.rotor_inertia_kg_m2,
         joint.drive.viscous_nm_s_rad,
         joint.drive.coulomb_nm,

@@ -20,7 +20,7 @@ use super::urdf::{FixedFrame, Frames, UrdfLink};
 pub(super) use drives::{DriveFile, Rest};
 pub use drives::{apply_drive_file, drive_file, drive_file_of_mjcf, drive_file_of_urdf};
 pub use mjcf::{mjcf, mjcf_with_links};
-pub use own_urdf::{OwnUrdf, OwnUrdfError, Takeover, Unfit, own_urdf};
+pub use own_urdf::{OwnUrdf, OwnUrdfError, Rescaling, Unfit, own_urdf};
 pub use urdf::{urdf, urdf_with_links};
 
 /// The arm is not one that a simulator accepts.
@@ -228,6 +228,33 @@ mod tests {
             assert_eq!(read.arm.joints[0].limits.torque_nm, f64::INFINITY);
             assert_eq!(read.arm.joints[1].limits.torque_nm, 150.0);
             assert!(read.notices.contains(&unknown));
+        }
+    }
+
+    /// Written as limits, the assumed range would stop the joint in a simulator.
+    #[test]
+    fn a_joint_without_end_stops_is_written_without() {
+        let known = urdf(&Arm::built_in("ur5").unwrap(), &Frames::default()).unwrap();
+        let text = known.replacen("\"revolute\"", "\"continuous\"", 1);
+        let arm = read_urdf(&text, "x.urdf").unwrap().arm;
+        let is_endless = |arm: &Arm| -> Vec<bool> {
+            arm.joints.iter().map(|joint| joint.assumed.position).collect()
+        };
+        assert_eq!(is_endless(&arm), [true, false, false, false, false, false]);
+        let written = urdf(&arm, &Frames::default()).unwrap();
+        assert!(written.contains("<joint name=\"shoulder_pan\" type=\"continuous\">"), "{written}");
+        assert!(written.contains("<limit effort=\"150\" velocity=\"3.14"), "{written}");
+        assert_eq!(written.matches("<limit lower=").count(), 5, "{written}");
+        let model = mjcf(&arm, &Frames::default()).unwrap();
+        assert!(model.contains("<joint name=\"shoulder_pan\" axis=\"0 0 1\" armature="), "{model}");
+        assert_eq!(model.matches(" range=").count(), 5, "{model}");
+        let of_urdf = read_urdf(&written, "x.urdf").unwrap().arm;
+        let of_mjcf = read_mjcf(&model, "x.xml").unwrap().arm;
+        for back in [of_urdf, of_mjcf] {
+            assert_eq!(is_endless(&back), is_endless(&arm));
+            for (a, b) in arm.joints.iter().zip(&back.joints) {
+                assert_eq!(a.limits.position_rad, b.limits.position_rad);
+            }
         }
     }
 

@@ -12,19 +12,19 @@ use thiserror::Error;
 
 use self::markup::{Edits, Margins, child};
 use self::share::Share;
-use super::xml::{about_com, numbers, tensor};
+use super::xml::{about_com, escaped, numbers, tensor};
 use super::{ExportError, check_numbers};
 use crate::robot::{Arm, Drive, LinkInertia, UrdfLink};
 
-pub use self::share::{Takeover, Unfit};
+pub use self::share::{Rescaling, Unfit};
 
 /// A URDF rewritten with the numbers of another arm of the same design.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnUrdf {
     /// The text of the file.
     pub text: String,
-    /// Bodies whose whole inertia was given to one link; `Display` puts each into words.
-    pub takeovers: Vec<Takeover>,
+    /// Bodies with links whose inertia was scaled to fit into them; `Display` puts each into words.
+    pub rescalings: Vec<Rescaling>,
     /// One mesh file that is given relative to the folder of the URDF, where there is any.
     pub relative_mesh: Option<String>,
 }
@@ -72,9 +72,10 @@ pub enum OwnUrdfError {
 ///
 /// - `<inertial>`: one link of each body, the bearer, gets the inertia of the body less that of the links fixed to it,
 ///   which keep their own. The bearer is the link directly behind the joint, or the first link with mass if that one
-///   has none. Where no body can have the remaining inertia, the bearer gets the whole of it, and the other links lose
-///   their `<inertial>` (a [`Takeover`]).
+///   has none. Where no body can have the remaining inertia, that of the other links is multiplied by one factor, about
+///   the largest that leaves a possible one (a [`Rescaling`]).
 /// - `<dynamics>` of the arm's joints: `damping` is rv, `friction` is rc.
+/// - `name`: a robot without a name gets that of the arm.
 /// - Everything else stays the same, byte for byte. What a URDF has no place for is in the
 ///   [`drive_file`](super::drive_file).
 ///
@@ -101,19 +102,22 @@ pub fn own_urdf(
             .ok_or_else(|| OwnUrdfError::Missing { file: file(), kind, name: name.to_owned() })
     };
     let mut edits = Edits::new(text);
-    let mut takeovers = Vec::new();
+    if robot.attribute("name").unwrap_or_default().is_empty() {
+        // It would be called after its new file, and the drive file and the results name the arm.
+        let name = escaped(&arm.name).replace('\'', "&apos;");
+        edits.set_attributes(robot, &[("name", name)]);
+    }
+    let mut rescalings = Vec::new();
     for (number, joint) in arm.joints.iter().enumerate() {
         let body: Vec<&UrdfLink> = links.iter().filter(|link| link.body == number + 1).collect();
         let Some(share) = Share::of(joint, &body) else {
             return Err(OwnUrdfError::NothingMoved { file: file(), joint: joint.name.clone() });
         };
         write_inertial(&mut edits, find("link", &share.bearer.name)?, &share.inertia);
-        for (name, _) in share.takeover.iter().flat_map(|takeover| &takeover.emptied) {
-            if let Some(inertial) = child(find("link", name)?, "inertial") {
-                edits.remove(inertial);
-            }
+        for (link, inertia) in &share.scaled {
+            write_inertial(&mut edits, find("link", &link.name)?, inertia);
         }
-        takeovers.extend(share.takeover);
+        rescalings.extend(share.rescaling);
         write_dynamics(&mut edits, find("joint", &joint.name)?, &joint.drive);
     }
     let relative_mesh = robot
@@ -122,7 +126,7 @@ pub fn own_urdf(
         .filter_map(|mesh| mesh.attribute("filename"))
         .find(|name| !name.contains("://") && !Path::new(name).is_absolute())
         .map(str::to_owned);
-    Ok(OwnUrdf { text: edits.applied(), takeovers, relative_mesh })
+    Ok(OwnUrdf { text: edits.applied(), rescalings, relative_mesh })
 }
 
 fn write_inertial(edits: &mut Edits<'_>, link: Node<'_, '_>, inertia: &LinkInertia) {

@@ -14,6 +14,7 @@ use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement, UrdfLink};
 ///   every axis is `0 0 1`; its inertia is about the centre of mass, in the link's axes.
 /// - `damping` is rv in Nm s/rad, `friction` is rc in Nm (multiplying tanh(q̇/ε) in this library, a sign or a
 ///   constraint in other programs).
+/// - A joint whose range was only assumed is continuous.
 /// - Rotor inertia, acceleration limit, gear ratio, torque constant, ε, torque offsets, gravity and clearance have no
 ///   place in a URDF; they are in the [`drive_file`](super::drive_file).
 pub fn urdf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
@@ -62,12 +63,18 @@ fn write_link(out: &mut String, joint: &Joint, name: &str) {
 }
 
 fn write_joint(out: &mut String, joint: &Joint, parent: &str, child: &str) {
-    let [lower, upper] = joint.limits.position_rad;
+    let (kind, range) = match joint.assumed.position {
+        true => ("continuous", String::new()),
+        false => {
+            let [lower, upper] = joint.limits.position_rad;
+            ("revolute", format!("lower=\"{lower}\" upper=\"{upper}\" "))
+        }
+    };
     let _ = write!(
         out,
-        "  <joint name=\"{name}\" type=\"revolute\">\n    {origin}\n    <parent link=\"{parent}\"/>\n    \
-         <child link=\"{child}\"/>\n    <axis xyz=\"0 0 1\"/>\n    <limit lower=\"{lower}\" \
-         upper=\"{upper}\" effort=\"{effort}\" velocity=\"{velocity}\"/>\n    <dynamics damping=\"{damping}\" \
+        "  <joint name=\"{name}\" type=\"{kind}\">\n    {origin}\n    <parent link=\"{parent}\"/>\n    \
+         <child link=\"{child}\"/>\n    <axis xyz=\"0 0 1\"/>\n    <limit {range}\
+         effort=\"{effort}\" velocity=\"{velocity}\"/>\n    <dynamics damping=\"{damping}\" \
          friction=\"{friction}\"/>\n  </joint>\n",
         name = escaped(&joint.name),
         origin = origin(&joint.placement),

@@ -112,6 +112,7 @@ impl CapsuleEntry {
     }
 
     fn capsule(&self, place: &Place, bodies: usize) -> Result<Capsule, RobotError> {
+        place.plain_name("capsule", &self.name)?;
         let place = place.table("capsule", &self.name);
         if self.body > bodies {
             let body = self.body;

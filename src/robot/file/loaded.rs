@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{name, read_toml};
+use crate::input::read_text;
 use crate::robot::arm::Arm;
 use crate::robot::error::RobotError;
 use crate::robot::export::{DriveFile, Rest};
@@ -114,6 +115,5 @@ pub(crate) fn is_urdf(file: &Path, text: &str) -> bool {
 
 /// Reads the text of a file that describes a robot.
 pub(crate) fn text_of(path: &Path) -> Result<String, RobotError> {
-    std::fs::read_to_string(path)
-        .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
+    read_text(path).map_err(|source| RobotError::Read { file: path.display().to_string(), source })
 }

@@ -7,6 +7,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::element::Element;
 use super::fault::MjcfFault;
+use crate::input::read_text;
 
 /// Largest nesting depth of elements: no arm needs more, and the stack can hold it.
 const DEEPEST: usize = 200;
@@ -133,7 +134,7 @@ impl Includes {
             return Err(MjcfFault::IncludedTwice { place: include.place(), file: file() });
         }
         self.known.push(known(&path));
-        let text = std::fs::read_to_string(&path).map_err(|e| MjcfFault::Include {
+        let text = read_text(&path).map_err(|e| MjcfFault::Include {
             place: include.place(),
             file: file(),
             reason: e.to_string(),

@@ -1,7 +1,7 @@
 //! Reading of an MJCF into an [`Arm`].
 
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
@@ -89,10 +89,6 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
     let pulls = Pulls::of(&root, &compiler, &defaults)?;
     let meshes = meshes(&root, &compiler, &defaults);
     let mut bodies = Bodies::of(&root, &compiler, &defaults, &actuated, &meshes, named.clone())?;
-    if bodies.robot.name.is_empty() {
-        let stem = Path::new(source).file_stem().unwrap_or_default();
-        bodies.robot.name = stem.to_string_lossy().into_owned();
-    }
     let coupled = couple(&root, &defaults, &named, &mut bodies.robot, &bodies.references)?;
     bodies.left_out.extend(coupled);
     bodies.left_out.extend(options.switch_off(&mut bodies.robot));

@@ -8,6 +8,9 @@ pub(super) fn arm_fault(fault: &UrdfFault) -> String {
         UrdfFault::Duplicate { kind: "link", name } => {
             format!("the body \"{name}\" is there twice; names must be unique")
         }
+        UrdfFault::ControlCharacter { kind: "link", name } => {
+            UrdfFault::ControlCharacter { kind: "body", name: name.clone() }.to_string()
+        }
         UrdfFault::NotOneChain { obstacles, proposal } => {
             let obstacles = list(obstacles);
             let remedy = match proposal {

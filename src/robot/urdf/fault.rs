@@ -19,6 +19,17 @@ pub enum UrdfFault {
         /// The name.
         name: String,
     },
+    /// A name that other files cannot hold.
+    #[error(
+        "the name of the {kind} {name:?} has a control character (a line break or the like), which other programs cannot read: \
+         rename it"
+    )]
+    ControlCharacter {
+        /// `robot`, `link`, `joint` or the like.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
     /// A joint names a link that does not exist.
     #[error("joint \"{joint}\": its {role} link \"{link}\" is not in the file")]
     UnknownLink {
@@ -217,6 +228,14 @@ pub(in crate::robot) fn infinitely_thin([small, middle, large]: &[f64; 3]) -> St
         "principal moments {small:.6e}, {middle:.6e}, {large:.6e} kg m2 are those of an infinitely thin plate (the largest is the sum of the \
          others), and every body has a thickness: make the largest a little smaller, for example by 0.1 %"
     )
+}
+
+/// Refuses a name with control characters: XML has no place for most of them, and changes the others.
+pub(in crate::robot) fn plain_name(kind: &'static str, name: &str) -> Result<(), UrdfFault> {
+    if name.chars().any(char::is_control) {
+        return Err(UrdfFault::ControlCharacter { kind, name: name.to_owned() });
+    }
+    Ok(())
 }
 
 /// Refuses NaN and infinite values.

@@ -13,6 +13,8 @@ use crate::robot::arm::{Assumed, Drive, Limits, Placement, UNKNOWN_TORQUE_NM};
 pub(super) const ASSUMED_VELOCITY_RAD_S: f64 = PI;
 /// Acceleration limit if the file gives none; the same as that of the built-in arms.
 pub(super) const ASSUMED_ACCELERATION_RAD_S2: f64 = 10.0;
+/// Range of a joint without end stops: that of an arm with internal cables.
+const ENDLESS_RAD: [f64; 2] = [-TAU, TAU];
 /// No arm turns farther from zero: a range beyond is one in degrees.
 const FARTHEST_RAD: f64 = 4.0 * PI;
 /// Tolerance of the length of an axis: axes such as (0.577, 0.577, 0.577) have unit length to three digits.
@@ -63,10 +65,9 @@ impl Reader {
                 return Err(UrdfFault::Negative { place, quantity, value });
             }
         }
-        let unlimited = limit.lower == f64::NEG_INFINITY && limit.upper == f64::INFINITY;
-        let position_rad = if joint.joint_type == JointType::Continuous || unlimited {
+        let position_rad = if is_endless(joint) {
             self.remarks.endless.push(name());
-            [-TAU, TAU]
+            ENDLESS_RAD
         } else if limit.lower < limit.upper && (limit.upper - limit.lower).is_finite() {
             [limit.lower, limit.upper]
         } else {
@@ -117,9 +118,17 @@ impl Reader {
     }
 }
 
-/// What a URDF does not say about a joint: it never has a drive, and often lacks limits.
-pub(super) fn assumed(joint: &Joint) -> Assumed {
+/// Whether a joint has no end stops.
+fn is_endless(joint: &Joint) -> bool {
+    let unlimited = joint.limit.lower == f64::NEG_INFINITY && joint.limit.upper == f64::INFINITY;
+    joint.joint_type == JointType::Continuous || unlimited
+}
+
+/// What a URDF does not say about a joint with these `limits`: it never has a drive, and often lacks limits.
+pub(super) fn assumed(joint: &Joint, limits: &Limits) -> Assumed {
     Assumed {
+        // Soft limits may give a joint without end stops a range.
+        position: is_endless(joint) && limits.position_rad == ENDLESS_RAD,
         gear_ratio: true,
         torque_constant: true,
         velocity: given(joint.limit.velocity).is_none(),

@@ -25,7 +25,7 @@ mod words;
 
 pub use arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
 pub use fault::UrdfFault;
-pub(super) use fault::infinitely_thin;
+pub(super) use fault::{infinitely_thin, plain_name};
 pub use locked::{LockedJoint, Stand};
 pub use notice::UrdfNotice;
 pub use obstacle::Obstacle;

@@ -1,11 +1,14 @@
 //! Reading of a URDF into an [`Arm`].
 
+use std::ffi::OsStr;
+use std::path::Path;
+
 use urdf_rs::{Pose, Robot};
 
 use super::arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
 use super::chain::{Body, all_joints, bodies, joints_up_to};
 use super::collision::shapes;
-use super::fault::{UrdfFault, finite, quoted};
+use super::fault::{UrdfFault, finite, plain_name, quoted};
 use super::joint::{ASSUMED_ACCELERATION_RAD_S2, ASSUMED_VELOCITY_RAD_S, assumed, drive};
 use super::locked::{LockedJoint, locked_joints};
 use super::notice::UrdfNotice;
@@ -32,6 +35,7 @@ use crate::robot::inertia::LinkInertia;
 /// - **Joint frames**: the origin is that of the URDF joint, z lies along the joint axis a. With a given in the link
 ///   frame, the joint frame is the link frame turned by S with S ẑ = a: the smallest rotation from ẑ to a if a_z ≥ 0,
 ///   otherwise π about x followed by the smallest rotation from −ẑ to a. For the axis z, S = 1.
+/// - **Name**: a robot without a name is called after the file, without folder and extension.
 /// - **Friction**: `damping` is rv, `friction` is rc. **Limits**: `effort` is the torque limit (unknown from 1e9 Nm
 ///   on), `velocity` the speed limit. The soft limits of a `<safety_controller>` narrow the range.
 /// - **Collision shapes** become capsules on the bodies, and pairs of capsules to keep apart; meshes (STL, OBJ) are
@@ -94,11 +98,12 @@ pub(in crate::robot) fn arm_of(
     source: &str,
     last_link: Option<&str>,
 ) -> Result<UrdfArm, UrdfFault> {
+    plain_name("robot", &robot.name)?;
     let mut reader = Reader::default();
     let (root, joints) = reader.arm(robot, source, last_link)?;
     Ok(UrdfArm {
         arm: Arm {
-            name: if robot.name.is_empty() { source.to_owned() } else { robot.name.clone() },
+            name: if robot.name.is_empty() { stem(source) } else { robot.name.clone() },
             gravity_m_s2: usual_gravity().into(),
             gravity_assumed: true,
             friction_epsilon_rad_s: default_epsilon(),
@@ -113,6 +118,12 @@ pub(in crate::robot) fn arm_of(
         notices: reader.notices,
         meshes: Vec::new(),
     })
+}
+
+/// Name of a robot whose file does not give one: it must not depend on the folder from which the file is named.
+fn stem(source: &str) -> String {
+    let stem = Path::new(source).file_stem().unwrap_or(OsStr::new(source));
+    stem.to_string_lossy().into_owned()
 }
 
 /// Names of the links that move with the arm.
@@ -196,14 +207,16 @@ impl Reader {
                 Some(joint) => {
                     let turn = self.axis_to_z(joint)?;
                     let origin = self.placement(&joint.origin, &quoted("joint", &joint.name))?;
+                    let drive = drive(joint)?;
+                    let limits = self.limits(joint)?;
                     joints.push(Joint {
                         name: joint.name.clone(),
                         placement: parent.compose(&origin).compose(&turn),
                         link: LinkInertia::zero(),
-                        drive: drive(joint)?,
-                        limits: self.limits(joint)?,
+                        drive,
+                        limits,
                         bounds: LinkBounds::default(),
-                        assumed: assumed(joint),
+                        assumed: assumed(joint, &limits),
                     });
                     turn
                 }

@@ -190,6 +190,7 @@ fn a_continuous_joint_has_two_turns_and_missing_limits_are_named() {
     parts[3] = joint("j1", "continuous", "base", "a", "");
     let UrdfArm { arm, notices, .. } = read(&robot(&parts));
     assert_eq!(arm.joints[0].limits.position_rad, [-TAU, TAU]);
+    assert!(arm.joints[0].assumed.position && !arm.joints[1].assumed.position);
     assert_eq!(arm.joints[0].limits.velocity_rad_s, PI);
     assert_eq!(arm.joints[0].limits.torque_nm, f64::INFINITY);
     let joint = || "j1".to_owned();
@@ -244,6 +245,12 @@ fn soft_limits_narrow_the_range() {
         let told = UrdfNotice::SoftLimits { joints: vec![("j2".into(), range)] };
         assert_eq!(notices.contains(&told), is_told, "{soft}");
     }
+    // They are all that a joint without end stops has.
+    let endless = of(r#"soft_lower_limit="-0.5" soft_upper_limit="3""#)
+        .replace("name=\"j2\" type=\"revolute\"", "name=\"j2\" type=\"continuous\"");
+    let arm = read(&endless).arm;
+    assert_eq!(arm.joints[1].limits.position_rad, [-0.5, 3.0]);
+    assert!(!arm.joints[1].assumed.position);
     let apart = of(r#"soft_lower_limit="3" soft_upper_limit="4""#);
     says(&apart, &["\"j2\"", "3 to 4 rad (<safety_controller>)", "range -1 to 2 rad"]);
 }
@@ -395,6 +402,29 @@ fn names_that_are_missing_or_double_are_refused() {
     says(&with(&[link("a", BODY)]), &["link", "\"a\"", "twice"]);
     let text = with(&[link("c", BODY), joint("j2", "fixed", "b", "c", "")]);
     says(&text, &["joint", "\"j2\"", "twice"]);
+}
+
+#[test]
+fn a_robot_without_a_name_is_called_after_its_file() {
+    let text = robot(&two_joints());
+    for nameless in ["<robot>", "<robot name=\"\">"] {
+        let text = text.replace("<robot name=\"toy\">", nameless);
+        for source in ["my.arm.urdf", "./my.arm.urdf", "/cell/my.arm.urdf"] {
+            assert_eq!(read_urdf(&text, source).unwrap().arm.name, "my.arm", "{source}");
+        }
+    }
+}
+
+#[test]
+fn names_with_control_characters_are_refused() {
+    let text = robot(&two_joints());
+    for (from, to, words) in [
+        ("\"toy\"", "\"t&#9;oy\"", "the name of the robot \"t\\toy\" has a control character"),
+        ("\"a\"", "\"a&#10;a\"", "the name of the link \"a\\na\" has"),
+        ("\"j2\"", "\"j&#10;2\"", "the name of the joint \"j\\n2\" has"),
+    ] {
+        says(&text.replace(from, to), &[words]);
+    }
 }
 
 #[test]

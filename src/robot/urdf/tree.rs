@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use urdf_rs::{Joint, Link, Robot};
 
-use super::fault::UrdfFault;
+use super::fault::{UrdfFault, plain_name};
 
 /// Links that are all connected to one root, each by one joint to its parent.
 pub(super) struct Tree<'a> {
@@ -88,6 +88,7 @@ fn links_by_name(robot: &Robot) -> Result<HashMap<&str, &Link>, UrdfFault> {
     }
     let mut links = HashMap::new();
     for link in &robot.links {
+        plain_name("link", &link.name)?;
         if links.insert(link.name.as_str(), link).is_some() {
             return Err(UrdfFault::Duplicate { kind: "link", name: link.name.clone() });
         }
@@ -102,6 +103,7 @@ fn children_by_link<'a>(
     let mut names = HashSet::new();
     let mut children: HashMap<&str, Vec<&Joint>> = HashMap::new();
     for joint in &robot.joints {
+        plain_name("joint", &joint.name)?;
         if !names.insert(joint.name.as_str()) {
             return Err(UrdfFault::Duplicate { kind: "joint", name: joint.name.clone() });
         }

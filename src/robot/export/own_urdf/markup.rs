@@ -58,15 +58,6 @@ impl<'t> Edits<'t> {
         self.changes.push((element.range(), write(&margins)));
     }
 
-    /// Removes `element`, and its line with it where the element has the line to itself.
-    pub(super) fn remove(&mut self, element: Node<'_, '_>) {
-        let Range { start, end } = element.range();
-        let behind = self.text[end..].trim_start_matches([' ', '\t']);
-        let is_last = behind.starts_with(['\r', '\n']);
-        let margin = margin(self.text, element).filter(|_| is_last).unwrap_or_default();
-        self.changes.push((start - margin.len()..end, String::new()));
-    }
-
     /// Inserts what `write` returns as the first child of `parent`.
     pub(super) fn put_first(
         &mut self,
@@ -231,15 +222,6 @@ mod tests {
         );
         assert_eq!(put("<j><a/></j>"), "<j><a/><n/></j>");
         assert_eq!(put("<j/>"), "<j><n/></j>");
-    }
-
-    #[test]
-    fn an_element_goes_with_its_line_and_without_those_of_others() {
-        let removed =
-            |text: &str| edited(text, |edits, root| edits.remove(child(root, "n").unwrap()));
-        assert_eq!(removed("<l>\r\n  <n>\r\n  </n>\r\n  <v/>\r\n</l>"), "<l>\r\n  <v/>\r\n</l>");
-        assert_eq!(removed("<l>\n  <n/> <!-- why -->\n</l>"), "<l>\n   <!-- why -->\n</l>");
-        assert_eq!(removed("<l><n/><v/></l>"), "<l><v/></l>");
     }
 
     #[test]

@@ -73,6 +73,8 @@ fn bad_input_is_told_with_its_place() {
     }
     let twice = one("", "", &format!("<joint/>{BODY}<body name=\"a\"/>"));
     says(&twice, &["body \"a\" is there twice"]);
+    let broken = one("", "", &format!("<joint/>{BODY}")).replace("name=\"a\"", "name=\"a&#10;b\"");
+    says(&broken, &["the name of the body \"a\\nb\" has a control character"]);
     says("<mujoco><worldbody>", &["not readable as XML"]);
     says("", &["not readable as XML"]);
     says("<sdf/>", &["line 1: <sdf>", "<mujoco>"]);
