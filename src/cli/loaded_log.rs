@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use crate::diagnose::Mended;
 use crate::identify::{Measurement, Misreading, Options, Regression};
-use crate::log::{Layout, Log, read_log};
+use crate::log::{Layout, Log, LogWarning, read_log};
 use crate::report::json::Input;
 use crate::robot::{Arm, JointSignals};
+use crate::signal::{empty_above_hz, natural_rate_hz};
 
 /// A log with its torque in Nm.
 pub struct LoadedLog {
@@ -31,10 +32,16 @@ impl LoadedLog {
     ) -> Result<Self, Box<dyn std::error::Error>> {
         let mut log = read_log(file, layout, arm.dof())?;
         log.warn_of_assumed_gains(arm);
+        let torque_nm = log.torque_nm(arm);
+        let rate_hz = natural_rate_hz(&log.time_s).ok();
+        if let (Ok(torque_nm), Some(rate_hz)) = (&torque_nm, rate_hz)
+            && let Some(above_hz) = empty_above_hz(torque_nm, rate_hz)
+        {
+            log.rows.warnings.push(LogWarning::FilteredTorque { above_hz });
+        }
         eprintln!("{}:\n{}", file.display(), log.rows);
-        let torque_nm = log.torque_nm(arm)?;
         let input = Input { path: file.to_owned(), sha256: log.sha256.clone() };
-        Ok(Self { log, torque_nm, input, mended: Vec::new() })
+        Ok(Self { log, torque_nm: torque_nm?, input, mended: Vec::new() })
     }
 
     /// The channels that identification needs.

@@ -109,6 +109,11 @@ pub enum LogWarning {
         /// Rows per second.
         rate_hz: f64,
     },
+    /// The torque was filtered before it was logged.
+    FilteredTorque {
+        /// Frequency above which it holds nothing, Hz.
+        above_hz: f64,
+    },
     /// Time stamps say when a row arrived; evenly sampled rows are put on the straight line through their stamps.
     ArrivalStamps {
         /// Scatter of the stamps about the line (rms), s.
@@ -218,6 +223,11 @@ impl fmt::Display for LogWarning {
                 f,
                 "time stamps are rounded to {resolution_s:.4} s: rows are taken to be evenly apart, {rate_hz:.3} a second, as the motion \
                  says that they are"
+            ),
+            Self::FilteredTorque { above_hz } => write!(
+                f,
+                "the torques hold nothing above {above_hz:.0} Hz, not even noise: they were filtered before they were logged, or simulated \
+                 without noise. Give them as they were measured: a filter rounds off friction where joints reverse, which looks like other effects"
             ),
             Self::ArrivalStamps { rms_s, rate_hz } => write!(
                 f,
