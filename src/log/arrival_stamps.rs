@@ -7,7 +7,7 @@
 
 use super::account::LogWarning;
 use super::clean::Motion;
-use super::even_stamps::{FEWEST_ROWS, StampLine, defect};
+use super::even_stamps::{FEWEST_ROWS, StampLine, spread};
 
 /// A step scatters if it differs from the usual step by more than this fraction of it, ...
 const SCATTERS: f64 = 0.1;
@@ -20,8 +20,6 @@ const WINDOW: usize = 128;
 const PROMPT: usize = 10;
 /// A row that was lost moves all later stamps by one step. Half of that, between windows, is no scatter.
 const LOST: f64 = 0.5;
-/// The line is accepted only if it reduces the mismatch between angles and velocities to less than this fraction.
-const BETTER: f64 = 0.5;
 
 /// Returns even stamps for rows whose own stamps scatter about them, and the warning that reports the repair; `None` if
 /// few of them do, if rows or time were lost, or if the motion does not tell that the rows were sampled evenly.
@@ -29,7 +27,8 @@ pub(super) fn arrival_stamps(motion: &Motion) -> Option<(Vec<f64>, LogWarning)> 
     if motion.rows() < FEWEST_ROWS {
         return None;
     }
-    let StampLine { even_s, step_s, off_s } = StampLine::through(motion)?;
+    let line = StampLine::through(motion)?;
+    let (off_s, step_s) = (&line.off_s, line.step_s);
     let scatters = |pair: &&[f64]| (pair[1] - pair[0]).abs() > SCATTERS * step_s;
     let scattered = off_s.windows(2).filter(scatters).count();
     if (scattered as f64) < COMMON * (off_s.len() - 1) as f64 {
@@ -39,16 +38,10 @@ pub(super) fn arrival_stamps(motion: &Motion) -> Option<(Vec<f64>, LogWarning)> 
         let mut off_s = window.to_vec();
         *off_s.select_nth_unstable_by(window.len() / PROMPT, f64::total_cmp).1
     };
-    let ends = |[low, high]: [f64; 2], off: f64| [low.min(off), high.max(off)];
-    let windows = off_s.chunks_exact(WINDOW.min(off_s.len())).map(prompt_s);
-    let [low_s, high_s] = windows.fold([f64::INFINITY, f64::NEG_INFINITY], ends);
-    if high_s - low_s > LOST * step_s {
-        return None;
-    }
-    let rms_s = (off_s.iter().map(|off| off * off).sum::<f64>() / off_s.len() as f64).sqrt();
-    let on_the_line = Motion { time_s: &even_s, ..*motion };
-    let is_better = defect(&on_the_line) < BETTER * defect(motion);
-    is_better.then(|| (even_s, LogWarning::ArrivalStamps { rms_s, rate_hz: 1.0 / step_s }))
+    let is_as_late_everywhere =
+        spread(off_s.chunks_exact(WINDOW.min(off_s.len())).map(prompt_s)) <= LOST * step_s;
+    let warning = LogWarning::ArrivalStamps { rms_s: line.rms_s(), rate_hz: 1.0 / step_s };
+    (is_as_late_everywhere && line.is_told_by(motion)).then_some((line.even_s, warning))
 }
 
 #[cfg(test)]
@@ -103,12 +96,13 @@ mod tests {
         assert_eq!(repaired(&stamps_s, &stamps_s), None);
     }
 
-    /// A row is missing in the middle: no line goes through what is left of the log.
+    /// A row is missing in the middle: no line goes through what is left of the log, whether its stamps scatter or not.
     #[test]
     fn rows_that_were_lost_are_no_scatter() {
         let sampled_s: Vec<f64> =
             (0..ROWS).map(|k| (k + usize::from(k >= ROWS / 2)) as f64 * STEP_S).collect();
         assert!(repaired(&sampled_s, &sampled_s).is_none());
+        assert!(repaired(&sampled_s, &arrivals(&sampled_s)).is_none());
     }
 
     /// A recorder that is late by half a step with every twentieth row is not one that scatters.

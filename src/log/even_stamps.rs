@@ -58,19 +58,21 @@ pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
     if !is_coarse || !time_s.iter().all(is_on_grid) {
         return None;
     }
-    let StampLine { even_s: even, step_s, off_s } = StampLine::through(motion)?;
-    let count = time_s.len() as f64;
-    let ends = |[low, high]: [f64; 2], off: &f64| [low.min(*off), high.max(*off)];
-    let [low, high] = off_s.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
-    let rms_s = (off_s.iter().map(|off| off * off).sum::<f64>() / count).sqrt();
-    let is_rounded =
-        high - low <= WITHIN_STEPS * resolution_s && rms_s >= LEAST_RMS_STEPS * resolution_s;
-    if !is_rounded {
-        return None;
-    }
-    let on_the_line = Motion { time_s: &even, ..*motion };
-    let is_better = defect(&on_the_line) < BETTER * defect(motion);
-    is_better.then(|| EvenStamps { resolution_s, rate_hz: 1.0 / step_s, time_s: even })
+    let line = StampLine::through(motion)?;
+    let is_rounded = spread(line.off_s.iter().copied()) <= WITHIN_STEPS * resolution_s
+        && line.rms_s() >= LEAST_RMS_STEPS * resolution_s;
+    (is_rounded && line.is_told_by(motion)).then(|| EvenStamps {
+        resolution_s,
+        rate_hz: 1.0 / line.step_s,
+        time_s: line.even_s,
+    })
+}
+
+/// Distance of the largest of the `values` from the smallest.
+pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
+    let ends = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
+    let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], ends);
+    high - low
 }
 
 /// The straight line through the stamps of all rows, by their places in the file.
@@ -102,6 +104,18 @@ impl StampLine {
         let even_s: Vec<f64> = place.iter().map(|k| mean_s + (k - middle) * step_s).collect();
         let off_s = time_s.iter().zip(&even_s).map(|(t, even)| t - even).collect();
         Some(Self { even_s, step_s, off_s })
+    }
+
+    /// Root mean square of the stamps about the line, s.
+    pub(super) fn rms_s(&self) -> f64 {
+        let squares: f64 = self.off_s.iter().map(|off| off * off).sum();
+        (squares / self.off_s.len() as f64).sqrt()
+    }
+
+    /// Whether the `motion` tells that its rows were sampled along the line, and not when their stamps say.
+    pub(super) fn is_told_by(&self, motion: &Motion) -> bool {
+        let on_the_line = Motion { time_s: &self.even_s, ..*motion };
+        defect(&on_the_line) < BETTER * defect(motion)
     }
 }
 
