@@ -45,8 +45,51 @@ pub fn median_step(time_s: &[f64]) -> Option<f64> {
 }
 
 /// Number of steps of `typical_s` that are missing between the stamps `k` − 1 and `k` of `time_s`, not rounded.
-pub fn missing_steps(time_s: &[f64], k: usize, typical_s: f64) -> f64 {
+fn missing_steps(time_s: &[f64], k: usize, typical_s: f64) -> f64 {
     lasting(k, |k| Some((time_s.get(k)? - time_s.get(k.checked_sub(1)?)?) / typical_s - 1.0))
+}
+
+/// A step is uneven if it is farther than this from every whole number of typical steps, in such steps. Stamps of evenly
+/// sampled rows, lost ones among them, are closer, and so are those of a recorder that alternates between 10 and 12 ms.
+const UNEVEN: f64 = 0.25;
+/// Rows are sampled unevenly if at least this share of the steps is uneven. Single rows that are late are fewer.
+const OFTEN: f64 = 0.2;
+/// Share of the steps that are not longer than the longest ones among which no row is missing. The rows that are really
+/// missing may be behind the others.
+const USUAL: f64 = 0.95;
+
+/// The time steps of a record of which no row is missing.
+pub struct UsualStep {
+    typical_s: f64,
+    longest_s: f64,
+}
+
+impl UsualStep {
+    /// The median step and, for rows that are sampled unevenly, a step that few exceed; `None` without any step.
+    pub fn of(time_s: &[f64]) -> Option<Self> {
+        let typical_s = median_step(time_s)?;
+        let steps = time_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
+        let mut steps: Vec<f64> = steps.collect();
+        let is_uneven = |step: &&f64| {
+            let ratio = **step / typical_s;
+            (ratio - ratio.round().max(1.0)).abs() > UNEVEN
+        };
+        let uneven = steps.iter().filter(is_uneven).count();
+        if (uneven as f64) < OFTEN * steps.len() as f64 {
+            return Some(Self { typical_s, longest_s: typical_s });
+        }
+        let place = (USUAL * steps.len() as f64) as usize;
+        let longest_s = *steps.select_nth_unstable_by(place, f64::total_cmp).1;
+        Some(Self { typical_s, longest_s })
+    }
+
+    /// Number of rows that are missing between the stamps `k` − 1 and `k` of `time_s`.
+    pub fn missing_rows(&self, time_s: &[f64], k: usize) -> f64 {
+        match missing_steps(time_s, k, self.longest_s).round() > 0.0 {
+            true => missing_steps(time_s, k, self.typical_s).round(),
+            false => 0.0,
+        }
+    }
 }
 
 /// The part of the `excess` of step `k` that the two neighbouring steps do not compensate, or 0.
@@ -70,6 +113,27 @@ mod tests {
         let found: Vec<f64> =
             (1..left_out.len()).map(|k| missing_steps(&left_out, k, 1.0).round()).collect();
         assert_eq!(found, [0.0, 0.0, 0.0, 2.0, 0.0]);
+    }
+
+    /// Steps of 2 to 6 ms at random, and every hundredth 40 ms long: nine rows are missing there, of which short steps
+    /// beside may give back one, and none elsewhere.
+    #[test]
+    fn uneven_steps_miss_nothing() {
+        let step_s = |k: usize| match k % 100 {
+            99 => 0.040,
+            _ => 0.002 + 0.001 * (k * 7919 % 1009 % 5) as f64,
+        };
+        let add = |sum: &mut f64, k: usize| {
+            *sum += step_s(k);
+            Some(*sum)
+        };
+        let time_s: Vec<f64> = (0..2000).scan(0.0, add).collect();
+        let usual = UsualStep::of(&time_s).unwrap();
+        for k in 1..time_s.len() {
+            let missing = usual.missing_rows(&time_s, k);
+            let expected = if k % 100 == 99 { 8.0..=9.0 } else { 0.0..=0.0 };
+            assert!(expected.contains(&missing), "{k}: {missing}");
+        }
     }
 
     #[test]

@@ -93,6 +93,23 @@ fn coarse_angles_of_a_fast_log_are_no_fault() {
     }
 }
 
+/// Angles in steps of 0.01° without noise, and velocities computed from them: their error, 9 and 18 mrad/s at these rates,
+/// is the same in every period and turns friction round elsewhere at every reversal. (The log at 125 Hz had friction that
+/// turns round over another range of speeds.)
+#[test]
+fn very_coarse_angles_without_velocities_are_no_fault() {
+    let step_rad = 0.01f64.to_radians();
+    let rounded = format!("{TORQUE_NOISE}q_step_rad = {step_rad}\n");
+    for (seed, rate_hz) in [(315, 125), (316, 250)] {
+        let plant = format!("[plant]\nlog_rate_hz = {rate_hz}.0\n");
+        let diagnosis = diagnose(seed, (&rounded, &plant), with_slopes);
+        assert_eq!(named(&diagnosis), [], "seed {seed}");
+        assert!(diagnosis.unexplained.is_none(), "seed {seed}");
+        let says_so = |warning: &String| warning.contains("steps of 0.0100° or 0.175 mrad");
+        assert!(diagnosis.warnings.iter().any(says_so), "{:?}", diagnosis.warnings);
+    }
+}
+
 /// What is hidden in such a log is found as in any other.
 #[test]
 fn friction_is_found_in_coarse_angles_of_a_fast_log() {

@@ -6,14 +6,17 @@ use super::verdict::{Diagnosis, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Parameter};
 use crate::identify::{Doubt, Identification, unlike};
+use crate::robot::JointSignals;
 
 impl Diagnoser<'_> {
-    /// Adds the doubt that the log may be that of another robot, or that no arm has these parameters.
+    /// Adds the doubt that the log with the angles `q_rad` may be that of another robot, or that no arm has these
+    /// parameters.
     pub(super) fn question_the_arm(
         &self,
         diagnosis: &mut Diagnosis,
         extension: &Extension,
         identification: &Identification,
+        q_rad: &JointSignals,
     ) {
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
         let sigma = sigma_of_friction_alone(diagnosis, self.set, self.arm.dof());
@@ -22,7 +25,8 @@ impl Diagnoser<'_> {
         let (theta, covariance) = (&extension.theta, &identification.covariance);
         let left = share_left(diagnosis, identification);
         let torque_nm = identification.residual().torque_rms_nm;
-        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance, &torque_nm);
+        let arm = (self.arm, self.set);
+        let doubt = Doubt::of(arm, &nominal, theta, &sigma, covariance, q_rad, &torque_nm);
         diagnosis.doubt = Doubt::or_unlike(doubt, unlike(self.arm, &left));
         if diagnosis.doubt.as_ref().is_some_and(Doubt::is_contradiction) {
             diagnosis.verdict = Verdict::Contradicted;

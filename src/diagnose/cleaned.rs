@@ -7,11 +7,13 @@ use super::error::DiagnoseError;
 use super::kind::Kind;
 use super::record::Record;
 use super::verdict::Cause;
-use crate::identify::{Identifier, Measurement, Options, Regression};
+use crate::identify::{Identifier, Measurement, Options, Regression, Untorn};
 
 /// A cleaned log, with what was found while cleaning it.
 pub struct Cleaned {
     record: Record,
+    /// Time of the log before the record, which is its longest run between jumps of the angles, s.
+    before_s: f64,
     /// The faults of the record, as causes.
     pub faults: Vec<Cause>,
     /// Joints (0-based) whose torque readings are not reliable.
@@ -30,7 +32,9 @@ impl Cleaned {
     /// # Errors [`DiagnoseError`] if the rows are invalid or the signals cannot be processed.
     pub fn of(m: &Measurement, options: &Options) -> Result<Self, DiagnoseError> {
         m.require_rows()?;
-        let Faults { causes: faults, record, warnings, unreadable: mut hanging } =
+        let untorn = Untorn::of(m);
+        let m = &untorn.as_ref().map_or(*m, |run| run.measurement(m.source));
+        let Faults { causes: faults, record, mut warnings, unreadable: mut hanging } =
             data_faults::find(m, options.is_single_run())?;
         let mut unreadable = coarse_joints(&faults);
         unreadable.append(&mut hanging);
@@ -41,7 +45,9 @@ impl Cleaned {
             true => Compared::TooFew,
             false => between_periods(&record.measurement(m.source), &unreadable)?,
         };
-        Ok(Self { record, faults, unreadable, is_mended, compared, warnings })
+        let before_s = untorn.as_ref().map_or(0.0, |run| run.before_s);
+        warnings.extend(untorn.map(|run| run.warning));
+        Ok(Self { record, before_s, faults, unreadable, is_mended, compared, warnings })
     }
 
     /// The contacts found, and the torque without them, if the comparison of repetitions shows any.
@@ -69,6 +75,7 @@ impl Cleaned {
     ) -> Result<Regression, DiagnoseError> {
         let mut regression = identifier.regression(&self.measurement(source))?;
         regression.prepared.count_filled(&self.record.filled);
+        regression.prepared.lead_in_s += self.before_s;
         Ok(regression)
     }
 }

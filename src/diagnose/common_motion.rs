@@ -24,16 +24,17 @@
 //! joint that rests or creeps is freed of noise ([`SlowStretches`]). Noise left in them is also in the equations, with the
 //! opposite sign, and therefore resembles any effect that depends on them. Only a few percent of the harmonics of an
 //! inertia's column are noise, but where the noise of the torque falls steeply with frequency these harmonics have the
-//! largest weight; and the friction of a joint at rest changes its sign with the noise of its velocity.
+//! largest weight; and the friction of a joint at rest changes its sign with the noise of its velocity. Where angles are
+//! coarse, friction is evaluated at velocities without their fastest harmonics ([`CoarseAngles`]).
 
-use super::friction_drift::FrictionDrift;
+use super::coarse_angles::CoarseAngles;
 use super::kept_bands::KeptBands;
 use super::load::load_along;
 use super::scene::equivalent_arm;
 use super::slow_stretches::{Sampled, SlowStretches};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion};
-use crate::identify::{Assembler, BetweenRows, Regression};
+use crate::identify::{Assembler, BetweenRows, FrictionDrift, Regression};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{Bracket, cubic_at, mean_period, subtract_mean_period};
 
@@ -45,15 +46,19 @@ use crate::signal::{Bracket, cubic_at, mean_period, subtract_mean_period};
 /// the predicted torque and the straight line through the predictions at the rows is therefore added.
 ///
 /// A single run is left unchanged: it has no motion but its own.
+///
+/// Returns the joints whose velocities lost harmonics because their angles are coarse.
 pub fn move_to_common_motion(
     regression: &mut Regression,
     (arm, set): (&Arm, &BaseSet),
     theta: &[f64],
-) {
-    let Some(each_period) = &regression.prepared.each_period else { return };
+) -> Vec<CoarseAngles> {
+    let Some(each_period) = &regression.prepared.each_period else { return Vec::new() };
     let n = regression.problem.samples;
     let sampled =
         Sampled { rate_hz: regression.problem.rate_hz, width_rad_s: arm.friction_epsilon_rad_s };
+    let mut own_rad = each_period.q_rad.clone();
+    let mut coarse = Vec::new();
     let mut own_rad_s = each_period.qd_rad_s.clone();
     let mut qdd_rad_s2 = regression.prepared.motion.qdd_rad_s2.clone();
     for j in 0..own_rad_s.joints() {
@@ -61,12 +66,18 @@ pub fn move_to_common_motion(
         let bands = KeptBands::that_stand_out(own, n);
         let told: Vec<f64> = own.chunks_exact(n).flat_map(|period| bands.of(period)).collect();
         let slow = SlowStretches::of(own, &told, n, &sampled);
+        if let Some(angles) = CoarseAngles::of(&regression.prepared, j, sampled.width_rad_s) {
+            angles.quieten(own, n);
+            coarse.push(angles);
+        }
         own.copy_from_slice(&slow.averaged(own, &told));
+        let q = own_rad.joint_mut(j);
+        q.copy_from_slice(&slow.averaged(q, q));
         let short = bands.of(qdd_rad_s2.joint(j));
         qdd_rad_s2.joint_mut(j).copy_from_slice(&slow.averaged(&short, &short));
     }
     let common = Motion {
-        q_rad: each_period.q_rad.map_joints(|_, q| mean_period(q, n)),
+        q_rad: own_rad.map_joints(|_, q| mean_period(q, n)),
         qd_rad_s: own_rad_s.map_joints(|_, qd| mean_period(qd, n)),
         qdd_rad_s2,
     };
@@ -94,6 +105,7 @@ pub fn move_to_common_motion(
     }
     Assembler::new(&model).assemble(&mut regression.problem, &model, &common, &torque_nm);
     regression.prepared.motion = common;
+    coarse
 }
 
 /// Standard deviation of the mean over the periods at every sample, Nm: the error that noise of torque and motion

@@ -16,7 +16,7 @@ use super::stalls::stalls;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
 use crate::identify::covariance::quantile_95;
-use crate::median::{median_step, missing_steps};
+use crate::median::{UsualStep, median_step};
 use crate::robot::JointSignals;
 use crate::signal::SignalError;
 
@@ -221,9 +221,8 @@ fn repeats(m: &Measurement) -> Vec<usize> {
 
 /// Rows that repeat the one before, or that are missing according to the time stamps.
 fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
-    let step_s = step_s(m);
-    let missing: f64 =
-        (1..m.time_s.len()).map(|k| missing_steps(m.time_s, k, step_s).round()).sum();
+    let missing: f64 = UsualStep::of(m.time_s)
+        .map_or(0.0, |usual| (1..m.time_s.len()).map(|k| usual.missing_rows(m.time_s, k)).sum());
     let repeated = repeats.len() as f64;
     let share = |rows: f64| rows / (missing + m.time_s.len() as f64);
     let fraction = share(missing + repeated);

@@ -19,7 +19,8 @@ use super::modesty::{make_modest, make_modest_beside_unknown};
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
 use super::remarks::{
-    contact_remark, drift_remark, limited_drives, rest_remark, slow_remark, tear_remark,
+    coarse_remark, contact_remark, drift_remark, limited_drives, rest_remark, slow_remark,
+    tear_remark,
 };
 use super::replay::measured_nm;
 use super::rms::rms_where;
@@ -85,7 +86,8 @@ impl<'a> Diagnoser<'a> {
         let identification = self.identifier.identify_regression(&regression)?;
         self.refuse_misread(&regression, m.source)?;
         let measured_nm = measured_nm(&regression);
-        move_to_common_motion(&mut regression, (self.arm, self.set), &identification.fit.theta);
+        let coarse =
+            move_to_common_motion(&mut regression, (self.arm, self.set), &identification.fit.theta);
 
         // What explains it.
         let setup = Setup { arm: self.arm, set: self.set, options: &self.options };
@@ -139,12 +141,16 @@ impl<'a> Diagnoser<'a> {
             slow: slow_remark(study, &measured_nm, &after_nm)
                 .filter(|_| causes.is_empty() && unexplained.is_none()),
         };
+        let friction = (self.arm.friction_epsilon_rad_s, &study.scene.coulomb_nm[..]);
         let warnings = [
             log.warnings.clone(),
             identification.warnings.clone(),
             contact_remark(study, &log).into_iter().collect(),
             rest_remark(&regression.prepared.motion.qd_rad_s).into_iter().collect(),
             drive_limit_remark(self.arm, m.torque_nm).into_iter().collect(),
+            coarse_remark(&coarse, &regression.prepared.angle_resolution_rad, friction)
+                .into_iter()
+                .collect(),
             of_held_out(&held_out),
             tear_remark(tears).into_iter().collect(),
         ];
@@ -171,7 +177,8 @@ impl<'a> Diagnoser<'a> {
             behind_the_overview: Vec::new(),
             warnings: warnings.concat(),
         };
-        self.question_the_arm(&mut diagnosis, &extension, &identification);
+        let q_rad = &regression.prepared.motion.q_rad;
+        self.question_the_arm(&mut diagnosis, &extension, &identification, q_rad);
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
         diagnosis.sentences = diagnosis.in_sentences(&laws, besides);

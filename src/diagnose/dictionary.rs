@@ -145,8 +145,10 @@ impl Study<'_> {
             |shapes: &[Shape]| self.entries_at(family, site, shapes).into_iter().flatten();
         let richer = entries(&law.richer_shapes(&self.scene));
         let finer = entries(&law.finer_shapes(&self.scene, site, shape));
-        let same = self.entries.iter().filter(|other| other.place() == entry.place());
-        let plain = same.map(|other| other.images.len()).max().unwrap_or(1);
+        let same = || self.entries.iter().filter(|other| other.place() == entry.place());
+        let usual = same().map(|other| other.shape.variant).min();
+        let usual = same().filter(|other| Some(other.shape.variant) == usual);
+        let plain = usual.map(|other| other.images.len()).max().unwrap_or(1);
         // If the null model absorbs the further coefficient, the law is the one without it.
         richer.filter(|entry| entry.images.len() > plain).chain(finer).collect()
     }

@@ -123,7 +123,7 @@ pub fn unknown_pulses(scene: &Scene) -> Vec<(usize, Vec<Column>)> {
 
 /// Indices at which a periodic velocity reverses: it passes from beyond one `width` of rest to beyond it on the other
 /// side.
-fn reversals(qd_rad_s: &[f64], width: f64) -> Vec<usize> {
+pub(super) fn reversals(qd_rad_s: &[f64], width: f64) -> Vec<usize> {
     let n = qd_rad_s.len();
     let Some(start) = qd_rad_s.iter().position(|qd| qd.abs() > width) else { return Vec::new() };
     let mut sign = qd_rad_s[start].signum();

@@ -133,7 +133,7 @@ impl Diagnoser<'_> {
             separating_experiment: (!class.is_empty()).then(|| family.separating_experiment()),
             class,
             strength: selected.contender.score.lambda.max(0.0).sqrt(),
-            in_words: family.in_words_of(coefficients).to_owned(),
+            in_words: family.in_words_of(*shape, coefficients).to_owned(),
             record_fault: None,
             form: family.form(&study.scene, *shape),
             may_be_none,

@@ -27,6 +27,33 @@ impl KeptBands {
         Self { kept, clock }
     }
 
+    /// The bands in which the mean of the periods in `y`, of `n` samples each, is known: all up to the first with which
+    /// the noise of the mean exceeds `most` (rms) and which does not stand out of its own noise. Also the noise of the
+    /// mean in them (rms). `None` if these are all bands.
+    pub fn quieter_than(most: f64, y: &[f64], n: usize) -> Option<(Self, f64)> {
+        let clock = FineClock::new(n, 1);
+        let all: Vec<Band> = MeanSpectrum::of(&clock, y).bands(1).collect();
+        let (mut quiet, mut square) = (0, 0.0);
+        for band in &all {
+            // A coefficient and its conjugate have the same power.
+            let with_it = square + 2.0 * band.noise;
+            if with_it > most * most && band.power < STANDS_OUT * band.noise {
+                break;
+            }
+            (quiet, square) = (quiet + 1, with_it);
+        }
+        if quiet == all.len() {
+            return None;
+        }
+        let kept = (0..all.len()).map(|band| band < quiet).collect();
+        Some((Self { kept, clock }, square.sqrt()))
+    }
+
+    /// The highest harmonic that is kept.
+    pub fn highest(&self) -> usize {
+        self.kept.iter().rposition(|kept| *kept).map_or(0, |last| (last + 1) * BAND)
+    }
+
     /// One period of a motion, reduced to the bands that are kept.
     pub fn of(&self, period: &[f64]) -> Vec<f64> {
         let is_kept = |h: usize| h == 0 || self.kept[(h - 1) / BAND];
@@ -59,6 +86,30 @@ mod tests {
         let off = rms(told.iter().enumerate().map(|(k, told)| told - motion(k)));
         let of_mean = noise / (PERIODS as f64).sqrt();
         assert!(off < of_mean * (11.0 * 16.0 / SAMPLES as f64).sqrt(), "{off}");
+    }
+
+    /// White noise of standard deviation s in the mean has s √(2 · 8/1000) in each band of eight harmonics: a tenth of
+    /// its square fills 6.25 bands. The noise of six bands is known, from 2 · 7 · 48 deviations, to 4 % in rms, so that
+    /// five to seven are kept. Harmonic 101 stands out but lies beyond the first band that does not.
+    #[test]
+    fn bands_end_where_their_noise_is_too_much() {
+        let wave = |h: f64, k: usize| (TAU * h * k as f64 / SAMPLES as f64).sin();
+        let noise = 0.05;
+        let y = periods(|k| wave(3.0, k) + wave(101.0, k), noise);
+        let of_mean = noise / (PERIODS as f64).sqrt();
+        let most = of_mean * 0.1f64.sqrt();
+        let (bands, left) = KeptBands::quieter_than(most, &y, SAMPLES).unwrap();
+        assert!((5 * BAND..=7 * BAND).contains(&bands.highest()), "{}", bands.highest());
+        assert!(left <= most && left > 0.8 * most, "{left}");
+        let told = bands.of(&mean_period(&y, SAMPLES));
+        let off = rms(told.iter().enumerate().map(|(k, told)| told - wave(3.0, k)));
+        // The rms of 112 numbers is known to 7 %; three of these.
+        assert!(off < 1.2 * most, "{off}");
+        // What stands out is kept, however much noise it has.
+        let (bands, _) = KeptBands::quieter_than(0.0, &y, SAMPLES).unwrap();
+        assert!(bands.kept[0] && !bands.kept[12]);
+        // Bands of which none has too much noise.
+        assert!(KeptBands::quieter_than(2.0 * of_mean, &y, SAMPLES).is_none());
     }
 
     /// A motion that repeats exactly has no noise to stand out of, up to the rounding of a sum over n samples.

@@ -1,12 +1,14 @@
 //! A log for identification: what can be corrected within its rows is corrected, and every other fault of the record is
 //! told.
 
+use std::ops::Range;
+
 use super::data_faults::{Faults, find_by, step_s};
 use super::kind::Kind;
 use super::record::Record;
 use super::record_fault::RecordFault;
 use super::verdict::Cause;
-use crate::identify::Measurement;
+use crate::identify::{Measurement, Untorn};
 use crate::robot::JointSignals;
 use crate::signal::SignalError;
 
@@ -27,15 +29,21 @@ const SHORT_LAG: f64 = 0.2;
 
 impl Mended {
     /// Replaces wild readings of `m` and stale ones by what their neighbours say, gives time back that the clock lost, and
-    /// corrects velocities that come late.
+    /// corrects velocities that come late. Where the angles jump, as where another recording begins, that is done along
+    /// the longest run between two jumps, which alone is identified from.
     ///
     /// # Errors
     /// [`SignalError`] if the signals cannot be processed.
     pub fn of(m: &Measurement) -> Result<Self, SignalError> {
+        let untorn = Untorn::of(m);
+        let run = untorn.as_ref().map_or(*m, |run| run.measurement(m.source));
         // As along a single run, nothing is filled in.
-        let Faults { causes, record, warnings, .. } = find_by(m, true, SHORT_LAG * step_s(m))?;
+        let Faults { causes, mut record, warnings, .. } =
+            find_by(&run, true, SHORT_LAG * step_s(m))?;
+        let first = untorn.as_ref().map_or(0, |run| run.first_row);
+        record.rows.iter_mut().for_each(|row| *row += first);
         let mut all = Record::without_rows(m, &[]);
-        let is_whole = put_back(&record, &mut all);
+        let is_whole = put_back(&record, first..first + run.time_s.len(), &mut all);
         let is_told = |fault: &&Cause| match fault.kind {
             Kind::VelocityLag => false,
             // Rows that are missing are told where the log is prepared.
@@ -62,13 +70,13 @@ impl Mended {
 /// Longest run of rows that are left out of a record and can be put back between their neighbours.
 const SHORT_RUN: usize = 3;
 
-/// Puts the rows of the corrected `record` in place of those of the `log` from which it was made, and rows that were left
-/// out of it on straight lines between these. Runs of such rows longer than [`SHORT_RUN`] stay as they are; returns
-/// whether there are none.
-fn put_back(record: &Record, log: &mut Record) -> bool {
+/// Puts the rows of the corrected `record` in place of those of the `log` from whose rows `range` it was made, and rows
+/// that were left out of it on straight lines between these. Runs of such rows longer than [`SHORT_RUN`] stay as they
+/// are; returns whether there are none.
+fn put_back(record: &Record, range: Range<usize>, log: &mut Record) -> bool {
     let mut is_whole = true;
     let (mut next, mut lost_s) = (0, 0.0);
-    for row in 0..log.time_s.len() {
+    for row in range.clone() {
         if record.rows.get(next) == Some(&row) {
             // What the clock has lost so far, which rows that stay have to be given back too.
             lost_s = record.time_s[next] - log.time_s[row];
@@ -92,6 +100,7 @@ fn put_back(record: &Record, log: &mut Record) -> bool {
             }
         }
     }
+    log.time_s[range.end..].iter_mut().for_each(|time| *time += lost_s);
     is_whole
 }
 

@@ -4,7 +4,7 @@ use super::kind::Kind;
 use super::verdict::Cause;
 use crate::identify::Measurement;
 use crate::robot::JointSignals;
-use crate::signal::{Filled, Gap, SignalError, fill_gaps};
+use crate::signal::{Filled, Gap, SignalError, Tears, fill_gaps};
 
 /// How far a joint may turn between two rows beyond what its speed explains, rad.
 const TORN_RAD: f64 = 0.05;
@@ -33,9 +33,12 @@ const REACH_ROWS: usize = 24;
 const UNEVEN: f64 = 0.02;
 
 /// dy/dt at row `k`: the derivative of the interpolation by sin(πx)/(πx), under a Hann window, accurate to 1 % up to
-/// 0.45 of the sampling rate. `None` near the ends and where the rows are not evenly spaced.
-fn slope(time_s: &[f64], y: &[f64], k: usize) -> Option<f64> {
+/// 0.45 of the sampling rate. `None` near the ends, near `tears`, and where the rows are not evenly spaced.
+fn slope(time_s: &[f64], y: &[f64], k: usize, tears: &Tears) -> Option<f64> {
     let (first, last) = (k.checked_sub(REACH_ROWS)?, k + REACH_ROWS);
+    if tears.are_between(first, last) {
+        return None;
+    }
     let step_s = (time_s.get(last)? - time_s[first]) / (2 * REACH_ROWS) as f64;
     let is_even = |i: usize| {
         (time_s[i] - time_s[first] - (i - first) as f64 * step_s).abs() < UNEVEN * step_s
@@ -139,8 +142,14 @@ impl Record {
 
     /// Undoes the velocity lags among `causes`. Velocities that are late by less than `least_s` are moved in any case.
     pub fn undo_lags(&mut self, causes: &[Cause], least_s: f64) {
-        for lag in causes.iter().filter(|cause| cause.kind == Kind::VelocityLag) {
-            self.undo_lag(lag.joint.map(|j| j - 1), lag.parameters["delay_s"].value, least_s);
+        let mut lags = causes.iter().filter(|cause| cause.kind == Kind::VelocityLag).peekable();
+        if lags.peek().is_none() {
+            return;
+        }
+        let tears = self.measurement("").tears();
+        for lag in lags {
+            let (joint, lag_s) = (lag.joint.map(|j| j - 1), lag.parameters["delay_s"].value);
+            self.undo_lag(joint, lag_s, least_s, &tears);
         }
     }
 
@@ -148,17 +157,18 @@ impl Record {
     ///
     /// Where rows are evenly spaced, the velocity is computed from the angles, because what makes a velocity late is
     /// usually a filter, which also rounds the kinks at which friction is tested. Elsewhere, and if it is late by less than
-    /// `least_s`, the late velocity is moved, linearly between its samples.
-    fn undo_lag(&mut self, joint: Option<usize>, lag_s: f64, least_s: f64) {
+    /// `least_s`, the late velocity is moved, linearly between its samples. Neither goes across one of the `tears`.
+    fn undo_lag(&mut self, joint: Option<usize>, lag_s: f64, least_s: f64, tears: &Tears) {
         let t = &self.time_s;
         for j in joint.map_or(0..self.qd_rad_s.joints(), |j| j..j + 1) {
             let late = self.qd_rad_s.joint(j).to_vec();
             let q = self.q_rad.joint(j);
             for (k, value) in self.qd_rad_s.joint_mut(j).iter_mut().enumerate() {
-                let slope = slope(t, q, k).filter(|_| lag_s.abs() >= least_s);
+                let slope = slope(t, q, k, tears).filter(|_| lag_s.abs() >= least_s);
                 *value = slope.unwrap_or_else(|| {
                     let at = t[k] + lag_s;
-                    let right = t.partition_point(|s| *s < at).clamp(1, t.len() - 1);
+                    let run = tears.run_of(k);
+                    let right = t.partition_point(|s| *s < at).clamp(run.start + 1, run.end - 1);
                     let u = ((at - t[right - 1]) / (t[right] - t[right - 1])).clamp(0.0, 1.0);
                     late[right - 1] * (1.0 - u) + late[right] * u
                 });
@@ -202,14 +212,44 @@ mod tests {
             let w = std::f64::consts::TAU * share / step_s;
             let time_s: Vec<f64> = (0..n).map(|k| k as f64 * step_s).collect();
             let y: Vec<f64> = time_s.iter().map(|t| (w * t).sin()).collect();
+            let slope = |time_s: &[f64], k: usize| slope(time_s, &y, k, &Tears::of(time_s, &[&y]));
             for k in REACH_ROWS..n - REACH_ROWS {
                 let truth = w * (w * time_s[k]).cos();
-                assert!((slope(&time_s, &y, k).unwrap() - truth).abs() < 0.01 * w, "{share} {k}");
+                assert!((slope(&time_s, k).unwrap() - truth).abs() < 0.01 * w, "{share} {k}");
             }
-            assert!(slope(&time_s, &y, 5).is_none() && slope(&time_s, &y, n - 5).is_none());
+            assert!(slope(&time_s, 5).is_none() && slope(&time_s, n - 5).is_none());
             let torn: Vec<f64> =
                 time_s.iter().map(|t| if *t > 0.8 { t + 0.008 } else { *t }).collect();
-            assert!(slope(&torn, &y, 100).is_none() && slope(&torn, &y, 40).is_some());
+            assert!(slope(&torn, 100).is_none() && slope(&torn, 40).is_some());
+        }
+    }
+
+    /// A joint swings, and from row 200 on it is another recording that swings elsewhere. Velocities that come a step
+    /// late are put right on both sides, to (ω h)²/8 of 1.5 rad/s between two rows, except for the last rows of each
+    /// recording, which nothing follows.
+    #[test]
+    fn late_velocities_are_not_mended_across_a_tear() {
+        let (n, step_s) = (400, 0.008);
+        let time_s: Vec<f64> = (0..n).map(|k| k as f64 * step_s).collect();
+        let other = |k: usize| if k < 200 { 0.0 } else { 2.0 };
+        let of = |f: &dyn Fn(usize) -> f64| JointSignals::from_fn(1, n, |_, k| f(k));
+        let speed = |k: usize, t: f64| 1.5 * (3.0 * t + other(k)).cos();
+        for least_s in [0.0, 1.0] {
+            let mut record = Record {
+                time_s: time_s.clone(),
+                q_rad: of(&|k| other(k) + 0.5 * (3.0 * time_s[k] + other(k)).sin()),
+                qd_rad_s: of(&|k| speed(k, time_s[k] - step_s)),
+                torque_nm: JointSignals::zeros(1, n),
+                filled: Vec::new(),
+                rows: (0..n).collect(),
+            };
+            let tears = record.measurement("").tears();
+            assert_eq!(tears.run_of(200), 200..400);
+            record.undo_lag(None, step_s, least_s, &tears);
+            for k in (0..199).chain(200..399) {
+                let off = record.qd_rad_s.joint(0)[k] - speed(k, time_s[k]);
+                assert!(off.abs() < 1.5 * (3.0 * step_s).powi(2) / 8.0, "{k}: {off}");
+            }
         }
     }
 

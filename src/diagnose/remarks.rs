@@ -1,13 +1,15 @@
 //! Remarks about a log that bear on what a diagnosis says of it: drives at their limits, contacts that are not looked
-//! for, torques that drift.
+//! for, torques that drift, angles in coarse steps.
 
 use super::cleaned::Cleaned;
+use super::coarse_angles::CoarseAngles;
 use super::contact::Compared;
 use super::kind::Kind;
 use super::rms::rms_where;
 use super::study::Study;
 use super::verdict::{Cause, Unexplained};
 use crate::identify::{MOVING_RAD_S, drives_at_limits, resting_joints};
+use crate::number::significant;
 use crate::robot::{Arm, JointSignals};
 
 /// Time over which a slow error is averaged, in periods of the low-pass: longer than its memory, and with the usual
@@ -77,6 +79,36 @@ pub(super) fn rest_remark(qd_rad_s: &JointSignals) -> Option<String> {
 pub(super) fn tear_remark(tears: usize) -> Option<String> {
     let remark = "the angles jump as no arm can; what looks like a touch there is none";
     (tears > 0).then(|| remark.to_owned())
+}
+
+/// States on which joints friction is less well known because their angles were read in steps of `resolution_rad`. The
+/// arm's friction turns round over `width_rad_s` and is `coulomb_nm`.
+pub(super) fn coarse_remark(
+    coarse: &[CoarseAngles],
+    resolution_rad: &[f64],
+    (width_rad_s, coulomb_nm): (f64, &[f64]),
+) -> Option<String> {
+    let in_words = |of: &CoarseAngles| {
+        let step_rad = resolution_rad[of.joint];
+        let friction_nm = coulomb_nm[of.joint].abs() * of.error_rad_s / width_rad_s;
+        format!(
+            "joint {} (steps of {}° or {} mrad): velocity up to {} Hz, friction to {} Nm",
+            of.joint + 1,
+            significant(step_rad.to_degrees(), 3),
+            significant(1e3 * step_rad, 3),
+            significant(of.highest_hz, 2),
+            significant(friction_nm, 2)
+        )
+    };
+    let joints: Vec<String> = coarse.iter().map(in_words).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "angles are read in coarse steps, whose rounding is the same in every period, and nothing tells the velocities better. How much \
+             of them is used, and how well friction is known where joints reverse (one standard deviation): {}. Angles with more digits, or \
+             recorded velocities, would show smaller effects",
+            joints.join("; ")
+        )
+    })
 }
 
 /// Warns of mean torques that drift, except on joints with a thermal drift among the causes.

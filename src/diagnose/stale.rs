@@ -3,18 +3,19 @@
 //!
 //! A signal that is quantised in steps Δ and changes by c from reading to reading repeats by chance in about Δ/c of all
 //! readings, and a noisy one as often as it comes back to the reading before the last one. Readings that repeat far
-//! more often while their joint moves are stale, unless they lie at the end of the channel's range.
+//! more often while their joint moves are stale, unless they lie at the end of the channel's range. Steps may grow with
+//! the size of the readings ([`ReadingSteps`]).
 
 use rayon::prelude::*;
 
 use super::channel::Channel;
 use super::data_faults::MOVES_RAD_S;
+use super::reading_steps::ReadingSteps;
 use super::record::Record;
 use super::record_fault::RecordFault;
 use super::verdict::{Cause, Estimate};
 use crate::median::median;
 use crate::robot::JointSignals;
-use crate::signal::resolution;
 
 /// Stale readings must be this many times as frequent as chance makes them, and at least this share of all: a few
 /// missed samples are no cause of anything.
@@ -35,10 +36,6 @@ const ONE_NUMBER: f64 = 0.05;
 const NOISY: f64 = 0.5;
 /// Readings that differ by less than this share of their median change are the same but for rounding.
 const SAME: f64 = 1e-4;
-/// Readings are coarse if all but this share of their changes are larger than this share of the median. Of noise, a
-/// twentieth of the changes are smaller than a tenth of it.
-const SELDOM: f64 = 0.05;
-const COARSE: f64 = 0.5;
 /// If more than this share of the stale rows of every joint is common to all joints, the whole recorder hangs; and if
 /// more than this share of those of every channel is common to all channels of a joint, all of the joint does.
 const ALIKE: f64 = 0.9;
@@ -179,26 +176,20 @@ fn of_joint(record: &Record, joint: usize) -> OfJoint {
     OfJoint { joint, readings: [angles, velocities, torques], hangs }
 }
 
-/// The step of readings that hardly ever change by less; zero where changes are spread. Of slopes of rounded angles,
-/// printed with a few digits, no smallest difference shows it.
-fn coarse_step(y: &[f64]) -> f64 {
-    let mut changes: Vec<f64> =
-        y.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|change| *change > 0.0).collect();
-    changes.sort_by(f64::total_cmp);
-    let at = |share: f64| changes.get((share * changes.len() as f64) as usize).copied();
-    match (at(SELDOM), at(0.5)) {
-        (Some(least), Some(typical)) if least > COARSE * typical => least,
-        _ => 0.0,
-    }
-}
-
 /// Readings of `y` that repeat the one before although, by the resolution of `y`, they should change: first those of
 /// short runs, then those of a noisy sensor that hangs.
 fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, Vec<usize>) {
-    let step = resolution(y).max(coarse_step(y));
+    let sizes = |steps: Vec<f64>| -> f64 {
+        let mut sizes: Vec<f64> = steps.into_iter().map(f64::abs).filter(|v| *v > 0.0).collect();
+        median(&mut sizes).unwrap_or(0.0)
+    };
+    let change = sizes(y.windows(2).map(|w| w[1] - w[0]).collect());
+    // Of smaller steps, chance makes too few readings repeat to count.
+    let steps = ReadingSteps::of(y, LEAST_SHARE / BEYOND_CHANCE * change);
     let ends =
         y.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
-    let changing: Vec<usize> = (1..y.len()).filter(|k| should_change(*k, step)).collect();
+    let changing: Vec<usize> =
+        (1..y.len()).filter(|k| should_change(*k, steps.at(y[*k]))).collect();
     let is_stale = |k: &usize| y[*k] == y[k - 1] && !ends.contains(&y[*k]);
     let (mut single, mut hanging) = (Vec::new(), Vec::new());
     let all: Vec<usize> = changing.iter().copied().filter(is_stale).collect();
@@ -213,8 +204,8 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
         let (first, last) = (run[0], run[run.len() - 1]);
         // If the readings around a run are almost equal, the readings in it need not have changed.
         let around = y.get(last + 1).zip(first.checked_sub(2).map(|k| y[k]));
-        let changes =
-            around.is_some_and(|(next, before)| (next - before).abs() > BEYOND_CHANCE * step);
+        let least = BEYOND_CHANCE * steps.at(y[first]);
+        let changes = around.is_some_and(|(next, before)| (next - before).abs() > least);
         match run.len() {
             _ if limits.contains(&y[first]) => {}
             HANGS.. => hanging.extend_from_slice(run),
@@ -222,17 +213,13 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
             _ => {}
         }
     }
-    let sizes = |steps: Vec<f64>| -> f64 {
-        let mut sizes: Vec<f64> = steps.into_iter().map(f64::abs).filter(|v| *v > 0.0).collect();
-        median(&mut sizes).unwrap_or(0.0)
-    };
-    let change = sizes(y.windows(2).map(|w| w[1] - w[0]).collect());
     let bend = sizes(y.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]).collect());
     if bend < NOISY * change {
         // A smooth signal may as well be constant.
         hanging.clear();
     }
     let share = |rows: &[usize]| rows.len() as f64 / changing.len().max(1) as f64;
+    let step = steps.mean_at(changing.iter().map(|k| y[*k]));
     let by_steps = if change > 0.0 { step / change } else { 1.0 };
     // Noise comes back to the reading before the last one as often as it stays. (Velocities that are slopes of rounded
     // angles have coarse steps that no smallest difference shows, because times are rounded as well.)
@@ -351,6 +338,27 @@ mod tests {
             qd[k] = ((slope_rad_s.to_degrees() * 1e4).round() * 1e-4).to_radians();
         }
         record.q_rad.joint_mut(0).iter_mut().zip(counts).for_each(|(q, n)| *q = n * step_rad);
+        assert_eq!(mend(&mut record).causes, []);
+    }
+
+    /// Angles printed with four digits come in steps of 1 mrad from 1 rad on, and of 0.01 mrad below 0.1 rad. The joint
+    /// turns from 0.05 to 1.45 rad by up to 1.3 mrad from row to row.
+    #[test]
+    fn angles_of_four_digits_are_not_stale() {
+        let mut record = record(28.0, 0.3);
+        let scale = 0.7;
+        let printed = |q: &f64| {
+            let q_rad = 0.05 + scale * q;
+            let step_rad = 10f64.powf(q_rad.log10().floor() - 3.0);
+            (q_rad / step_rad).round() * step_rad
+        };
+        let q: Vec<f64> = record.q_rad.joint(0).iter().map(printed).collect();
+        let qd = record.qd_rad_s.joint_mut(0);
+        qd.iter_mut().for_each(|qd| *qd *= scale);
+        let repeats = |(pair, qd): (&[f64], &f64)| pair[0] == pair[1] && *qd > MOVES_RAD_S;
+        let repeated = q.windows(2).zip(&qd[1..]).filter(|row| repeats(*row)).count();
+        assert!(repeated > 100, "{repeated}");
+        record.q_rad.joint_mut(0).copy_from_slice(&q);
         assert_eq!(mend(&mut record).causes, []);
     }
 

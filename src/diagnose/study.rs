@@ -7,6 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::candidates::{Candidate, Shape};
+use super::coarse_angles;
 use super::dictionary::{ABSORBED, FAINT};
 use super::distinct_shapes::DistinctShapes;
 use super::drives::{self, Answer};
@@ -136,7 +137,11 @@ impl<'a> Study<'a> {
         let n = problem.samples;
         let differences = drives::differences(&scene);
         if let Whitening::Periods(periods) = &mut whitening {
-            periods.with_noise_of_joints(&drives::unknown_pulses(&scene));
+            let mut of_joints = drives::unknown_pulses(&scene);
+            for (j, torques) in &mut of_joints {
+                torques.extend(coarse_angles::turns(&scene, *j));
+            }
+            periods.with_noise_of_joints(&of_joints);
             let of_drives: Vec<Column> =
                 drives::leads(&scene).chain(drives::turns(&scene)).collect();
             let shares = differences.iter().map(|(_, torque)| torque);

@@ -5,8 +5,9 @@ use serde::{Serialize, Serializer};
 use super::covariance::Covariance;
 use super::gravity::gravity_remark;
 use super::negative_friction::negative_friction_remark;
+use super::negative_inertia::negative_inertia_remark;
 use crate::base::BaseSet;
-use crate::robot::Arm;
+use crate::robot::{Arm, JointSignals};
 
 /// Distance from zero, in σ, beyond which noise does not explain the sign of a parameter: noise alone turns a sign
 /// with a probability of 3e-7.
@@ -38,9 +39,9 @@ impl Doubt {
         Self { contradiction: None, question: Some(sentence) }
     }
 
-    /// Whether no arm, or no arm mounted as described, has such parameters: drives that push, gravity that pulls the
-    /// other way, or torque that has little to do with the motion. Otherwise the log may be of another arm, or of
-    /// another load.
+    /// Whether no arm, or no arm mounted as described, has such parameters: drives that push, inertia that is negative,
+    /// gravity that pulls the other way, or torque that has little to do with the motion. Otherwise the log may be of
+    /// another arm, or of another load.
     pub fn is_contradiction(&self) -> bool {
         self.contradiction.is_some()
     }
@@ -56,31 +57,32 @@ impl Doubt {
     }
 
     /// Examines base parameters `theta` of `arm`, whose values by its description are `nominal`. `sigma` and
-    /// `covariance` tell how well they are known; σ is infinite for a parameter that says nothing by itself.
-    /// `torque_nm` is the torque of the joints along the log (rms).
+    /// `covariance` tell how well they are known; σ is infinite for a parameter that says nothing by itself. `q_rad`
+    /// and `torque_nm` are the angles of the joints along the log and their torques (rms).
     pub fn of(
-        arm: &Arm,
-        set: &BaseSet,
+        (arm, set): (&Arm, &BaseSet),
         nominal: &[f64],
         theta: &[f64],
         sigma: &[f64],
         covariance: &Covariance,
+        q_rad: &JointSignals,
         torque_nm: &[f64],
     ) -> Option<Self> {
         let gravity = gravity_remark(arm, set, nominal, theta, covariance);
         let pushing = negative_friction_remark(arm, set, theta, sigma, torque_nm);
         let is_reversed = gravity.as_ref().is_some_and(|g| g.is_reversed);
-        let head = match (&pushing, is_reversed) {
-            (Some(_), _) => Some("What was identified is physically impossible."),
-            (None, true) => {
+        // A model that has gravity the wrong way round cannot tell inertia.
+        let inertia = negative_inertia_remark((arm, set), nominal, theta, sigma, covariance, q_rad)
+            .filter(|_| !is_reversed);
+        let impossible: Vec<String> = pushing.into_iter().chain(inertia).collect();
+        let head = match (impossible.is_empty(), is_reversed) {
+            (false, _) => Some("What was identified is physically impossible."),
+            (true, true) => {
                 Some("What was identified is impossible for an arm mounted as described.")
             }
-            (None, false) => None,
+            (true, false) => None,
         };
-        let contradiction = head.map(|head| match pushing {
-            Some(pushing) => format!("{head} {pushing}"),
-            None => head.to_owned(),
-        });
+        let contradiction = head.map(|head| [vec![head.to_owned()], impossible].concat().join(" "));
         let question =
             gravity.map(|gravity| format!("Is this log of {}? The {}.", arm.name, gravity.text));
         let doubt = Self { contradiction, question };
@@ -121,7 +123,8 @@ mod tests {
         };
         let doubt = |theta: &[f64]| {
             let sigma = covariance.sigma();
-            Doubt::of(&arm, &set, &nominal, theta, &sigma, &covariance, &[1.0; 6])
+            let q_rad = JointSignals::from_fn(6, 100, |j, k| (0.1 * ((j + 1) * k) as f64).sin());
+            Doubt::of((&arm, &set), &nominal, theta, &sigma, &covariance, &q_rad, &[1.0; 6])
         };
         assert_eq!(doubt(&nominal), None);
         let scaled = |prefix: &str, factor: f64| -> Vec<f64> {
@@ -143,6 +146,8 @@ mod tests {
         let pushing = doubt(&scaled("rc3", -1.0)).unwrap();
         assert!(pushing.is_contradiction() && pushing.sentence().contains("joint 3 (-"));
         assert!(!pushing.sentence().contains("Is this log"), "{pushing:?}");
+        let light = doubt(&scaled("Ia3", -1.0)).unwrap();
+        assert!(light.is_contradiction() && light.sentence().contains("which no arm has: joint 3"));
 
         // Of a log that is unlike the arm's, only contradictions by parameters are told as well.
         let much = unlike(&arm, &[0.3; 6]);

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::covariance::Covariance;
 use super::doubt::CERTAIN;
-use super::quality::{identifies_the_arm, not_identified};
+use super::quality::tells_the_arm;
 use crate::base::BaseSet;
 use crate::dynamics::{Parameter, ParameterLayout};
 use crate::robot::Arm;
@@ -157,12 +157,11 @@ pub fn gravity_remark(
     theta: &[f64],
     covariance: &Covariance,
 ) -> Option<GravityRemark> {
-    let quantile = covariance.quantile_95();
-    let half_width: Vec<f64> = covariance.sigma().iter().map(|s| quantile * s).collect();
-    if !identifies_the_arm(arm, set, &not_identified(arm, set, &half_width)) {
+    if !tells_the_arm(arm, set, covariance) {
         return None;
     }
-    GravityMatch::of(arm, set, nominal, theta, &covariance.matrix)?.remark(&arm.name, quantile)
+    let gravity = GravityMatch::of(arm, set, nominal, theta, &covariance.matrix)?;
+    gravity.remark(&arm.name, covariance.quantile_95())
 }
 
 #[cfg(test)]

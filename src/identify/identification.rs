@@ -1,6 +1,7 @@
 //! What comes out of identification.
 
 use super::covariance::Covariance;
+use super::drifting_friction::DriftingFriction;
 use super::fit::{Estimator, Fit};
 use super::lack_of_fit::LackOfFit;
 use super::pooled::Agreement;
@@ -23,7 +24,7 @@ pub struct Identification {
     pub processing: Processing,
     /// Torque samples per joint that were used.
     pub samples: usize,
-    /// Scatter of the torque between periods; `None` for a single run.
+    /// Scatter of the torque between periods, without friction that drifts; `None` for a single run.
     pub replicates: Option<Replicates>,
     /// Rms per joint of the repeating torque that the model does not explain, Nm; `None` for a single run.
     pub explainable_nm: Option<Vec<f64>>,
@@ -31,6 +32,10 @@ pub struct Identification {
     pub lack_of_fit: Option<LackOfFit>,
     /// Test whether several logs come from one arm; known where each of them repeats its motion.
     pub agreement: Option<Agreement>,
+    /// Friction that drifts along the log. The estimate then has its mean over the log, and covariance, scatter and tests
+    /// know only the noise beside it; the residual contains it. Not looked for in a motion that repeats less than
+    /// [`MANY_PERIODS`](super::MANY_PERIODS) times.
+    pub drifting_friction: Vec<DriftingFriction>,
     /// What the user should know about how the log was used.
     pub warnings: Vec<String>,
 }

@@ -1,6 +1,7 @@
 //! From a raw log to θ̂ and σ: the one path that real logs and simulated trials share.
 
 use super::covariance::{CovarianceError, CovarianceKind};
+use super::drifting_friction::TakenOut;
 use super::drive_answers::without_drive_answers;
 use super::error::IdentifyError;
 use super::estimation::{Estimate, Estimation, MotionAids};
@@ -15,7 +16,8 @@ use super::prepared::{Prepared, Processing};
 use super::problem::{Assembler, Problem};
 use super::regression::Regression;
 use super::rest::outpaced;
-use super::whiten::{SMOOTHER, smoothed};
+use super::untorn::Untorn;
+use super::whiten::{SMOOTHER, Spectrum, smoothed};
 use crate::base::{BaseSet, ColumnPlan};
 use crate::dynamics::Model;
 use crate::signal::{FineClock, Replicates, Scratch, ZeroPhase, fill_gaps};
@@ -30,6 +32,7 @@ pub struct Identifier<'a> {
     problem: Problem,
     estimation: Estimation,
     filter: Scratch,
+    spectrum: Spectrum,
     clock: Option<FineClock>,
 }
 
@@ -69,6 +72,7 @@ impl<'a> Identifier<'a> {
             estimation: Estimation::new(&problem),
             problem,
             filter: Scratch::default(),
+            spectrum: Spectrum::default(),
             clock: None,
         }
     }
@@ -162,6 +166,8 @@ impl<'a> Identifier<'a> {
             let (log, torque_nm) = (m.source.to_owned(), m.torque_nm.joint(joint)[0]);
             return Err(IdentifyError::DeadTorque { log, joint: joint + 1, torque_nm });
         }
+        let untorn = Untorn::of(m);
+        let m = &untorn.as_ref().map_or(*m, |run| run.measurement(m.source));
         let filled = if self.options.is_single_run() {
             None
         } else {
@@ -182,6 +188,10 @@ impl<'a> Identifier<'a> {
         if let Some(filled) = &filled {
             prepared.count_filled(&filled.gaps);
             prepared.warnings.push(filled.warning());
+        }
+        if let Some(run) = untorn {
+            prepared.lead_in_s += run.before_s;
+            prepared.warnings.push(run.warning);
         }
         let (first, every) = self.lay_out(&prepared)?;
         Ok((prepared, first, every))
@@ -271,7 +281,7 @@ impl<'a> Identifier<'a> {
     /// Solves the problem that was laid out from `prepared`, which comes from `log`.
     fn solve(
         &mut self,
-        prepared: Prepared,
+        mut prepared: Prepared,
         instruments: Option<&Problem>,
         log: &str,
     ) -> Result<Identification, IdentifyError> {
@@ -313,6 +323,7 @@ impl<'a> Identifier<'a> {
                 "a single run: the scatter between blocks of time holds for noise with a memory short against a block"
             }
         };
+        let drifts = self.take_out_drift(&mut prepared);
         self.take_out_drive_answers(&prepared);
         let aids = MotionAids { acceleration: prepared.acceleration.as_deref(), instruments };
         let estimate = self.estimation.estimate(
@@ -324,24 +335,48 @@ impl<'a> Identifier<'a> {
             &self.options,
         )?;
         let estimate = self.with_motion_noise(estimate, &prepared)?.of_fewer_rows(prepared.kept());
-        let Estimate { fit, mut covariances, lack_of_fit } = estimate;
+        let Estimate { mut fit, mut covariances, lack_of_fit } = estimate;
         let covariance = covariances.swap_remove(0).map_err(without)?;
+        let explainable_nm = prepared
+            .replicates
+            .as_ref()
+            .map(|r| explainable(&fit.residual_squares, fit.theta.len(), r, prepared.kept()));
+        if !drifts.is_empty() {
+            // The drift is a part of the torque that the model leaves, though neither noise nor the same every time.
+            drifts.iter().for_each(|drift| drift.put_back(&mut self.problem));
+            fit.state_residuals_of(&self.problem);
+        }
         Ok(Identification {
             estimator,
             samples: self.problem.samples * self.problem.periods,
-            explainable_nm: prepared
-                .replicates
-                .as_ref()
-                .map(|r| explainable(&fit.residual_squares, fit.theta.len(), r, prepared.kept())),
+            explainable_nm,
             covariance,
             covariance_reason,
             processing: prepared.processing,
             replicates: prepared.replicates,
             lack_of_fit,
             agreement: None,
+            drifting_friction: drifts
+                .iter()
+                .map(|drift| drift.finding(self.set, &fit.theta))
+                .collect(),
             warnings: prepared.warnings,
             fit,
         })
+    }
+
+    /// Takes friction that drifts along the log `prepared` out of the problem and of the scatter between its periods.
+    fn take_out_drift(&mut self, prepared: &mut Prepared) -> Vec<TakenOut> {
+        let [_, kept] = prepared.kept();
+        let qd_rad_s = &prepared.motion.qd_rad_s;
+        let Some(replicates) = &mut prepared.replicates else { return Vec::new() };
+        let Self { problem, spectrum, .. } = self;
+        if problem.periods < MANY_PERIODS || replicates.are_alike() {
+            return Vec::new();
+        }
+        let drifts = TakenOut::of(problem, qd_rad_s, spectrum);
+        drifts.iter().for_each(|drift| drift.leave(replicates, problem, kept));
+        drifts
     }
 
     /// Projects the drives' responses to friction out of the problem. A single run stays as it is: its low-pass is
@@ -381,9 +416,10 @@ impl<'a> Identifier<'a> {
         m: &Measurement,
         methods: &[(Estimator, Vec<CovarianceKind>)],
     ) -> Result<Vec<Result<Estimate, IdentifyError>>, IdentifyError> {
-        let (prepared, ..) = self.fill_from(m, false)?;
+        let (mut prepared, ..) = self.fill_from(m, false)?;
         let by_instruments = methods.iter().map(|(e, _)| *e).find(|e| *e == Estimator::Iv);
         let instruments = self.instruments_for(by_instruments, &prepared)?;
+        self.take_out_drift(&mut prepared);
         self.take_out_drive_answers(&prepared);
         let aids = MotionAids {
             acceleration: prepared.acceleration.as_deref(),

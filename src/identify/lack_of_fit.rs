@@ -10,7 +10,8 @@ use super::problem::Problem;
 /// On whitened rows (noise of unit variance) the mean period leaves LoF = P‖ȳ − Xθ̂‖²/ν₁ with ν₁ = rows − b, and the
 /// periods scatter by PE = Σ_p‖y_p − ȳ‖²/ν₂ with ν₂ = rows (P − 1). If the model holds, LoF/PE follows F(ν₁, ν₂)
 /// (Draper and Smith, Applied Regression Analysis). The test is made on Fourier coefficients, because these are
-/// independent for noise of any colour.
+/// independent for noise of any colour. Friction that drifts is no scatter, and is taken out before
+/// ([`DriftingFriction`](super::DriftingFriction)).
 ///
 /// The torque's own scatter comes first, and a model that passes against it passes. The noise of the motion that
 /// remains in the regressor is contained in ȳ − Xθ̂ but not in that scatter. A model that fails is therefore tested

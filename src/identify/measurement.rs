@@ -3,7 +3,7 @@
 use super::error::IdentifyError;
 use super::prediction::MOVING_RAD_S;
 use crate::robot::JointSignals;
-use crate::signal::reading_noise;
+use crate::signal::{Tears, reading_noise};
 
 /// Fewer samples than this are no experiment.
 pub(super) const FEWEST_SAMPLES: usize = 64;
@@ -35,6 +35,12 @@ impl Measurement<'_> {
             return Err(IdentifyError::TooShort { log, samples, needed: FEWEST_SAMPLES });
         }
         Ok(())
+    }
+
+    /// The places at which rows of another recording follow.
+    pub fn tears(&self) -> Tears {
+        let joints: Vec<&[f64]> = (0..self.q_rad.joints()).map(|j| self.q_rad.joint(j)).collect();
+        Tears::of(self.time_s, &joints)
     }
 
     /// Whether joint `j` ever moves faster than [`MOVING_RAD_S`] beyond its noise: σ √(2 ln N) is hardly exceeded by

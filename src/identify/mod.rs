@@ -2,8 +2,8 @@
 //!
 //! Enters: time stamps, angles, velocities and torques of one log or of several ([`Measurement`]), the
 //! [`Model`](crate::dynamics::Model) of the arm and its [`BaseSet`](crate::base::BaseSet). Leaves: the log on an even
-//! clock, laid out as equations ([`Regression`]); base parameters with their covariance and a test of what the model
-//! lacks ([`Identification`]), or how the log should have been read ([`Misreading`]); the torque predicted along
+//! clock, laid out as equations ([`Regression`]); base parameters with their covariance, a test of what the model
+//! lacks and friction that drifted ([`Identification`]), or how the log should have been read ([`Misreading`]); the torque predicted along
 //! other logs ([`Prediction`]) and planned motions ([`Forecast`]); standard parameters that a real arm can have
 //! ([`physical`]).
 
@@ -13,6 +13,7 @@ pub mod physical;
 mod bound;
 mod course;
 mod doubt;
+mod drifting_friction;
 mod drive_answers;
 mod drive_limits;
 mod error;
@@ -20,6 +21,7 @@ mod estimation;
 mod even;
 mod fit;
 mod forecast;
+mod friction_drift;
 mod gravity;
 mod identification;
 mod identifier;
@@ -29,6 +31,7 @@ mod measurement;
 mod misreading;
 mod motion_noise;
 mod negative_friction;
+mod negative_inertia;
 mod options;
 mod pooled;
 mod prediction;
@@ -42,11 +45,13 @@ mod rest;
 mod several_logs;
 mod triangle;
 mod unlike;
+mod untorn;
 mod whiten;
 
 pub use bound::{KnownNoise, cramer_rao};
 pub use course::Course;
 pub use doubt::Doubt;
+pub use drifting_friction::DriftingFriction;
 pub use drive_answers::{FEEDBACK_RAD_S, drive_answers, feedback_per_tick};
 pub use drive_limits::{AtLimit, drive_limit_remark, drives_at_limits};
 pub use error::IdentifyError;
@@ -54,6 +59,7 @@ pub use estimation::{Estimate, Estimation, MotionAids};
 pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use forecast::{Forecast, prediction_sd};
+pub use friction_drift::FrictionDrift;
 pub use identification::Identification;
 pub use identifier::{Identifier, MANY_PERIODS, kept_every};
 pub use lack_of_fit::{Floor, LackOfFit, by_noise_in_words};
@@ -73,4 +79,5 @@ pub use rest::{Rest, nothing_moves};
 pub use several_logs::SeveralLogs;
 pub use triangle::Triangle;
 pub use unlike::unlike;
+pub use untorn::Untorn;
 pub use whiten::Spectrum;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::covariance::{Covariance, CovarianceKind};
+use super::drifting_friction::DriftingFriction;
 use super::error::IdentifyError;
 use super::fit::{Estimator, Fit};
 use super::identification::Identification;
@@ -160,6 +161,10 @@ pub fn pooled(parts: &[Identification], joined: &Regression) -> Identification {
     };
     fit.state_residuals_of(&joined.problem);
     let periods = each.iter().map(|part| part.periods).sum();
+    let drifting = |(log, part): (usize, &Identification)| {
+        let named = |found: &DriftingFriction| DriftingFriction { log, ..*found };
+        part.drifting_friction.iter().map(named).collect::<Vec<_>>()
+    };
     Identification {
         estimator: Estimator::Spectral,
         fit,
@@ -171,6 +176,7 @@ pub fn pooled(parts: &[Identification], joined: &Regression) -> Identification {
         explainable_nm: None,
         lack_of_fit: lack_of_fit(parts),
         agreement: Some(agreement),
+        drifting_friction: parts.iter().enumerate().flat_map(drifting).collect(),
         warnings: joined.prepared.warnings.clone(),
     }
 }

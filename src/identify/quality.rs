@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use super::covariance::Covariance;
 use super::fit::{FitError, Fitter, Weighting};
 use super::problem::Problem;
 use super::triangle::Triangle;
@@ -85,6 +86,13 @@ pub fn identifies_the_arm(arm: &Arm, set: &BaseSet, open: &[usize]) -> bool {
     let is_moment_of_inertia =
         |&k: &usize| matches!(layout.parameter(set.column(k)[0].0), Parameter::Body(_, 4..));
     open.iter().all(is_moment_of_inertia) && 4 * open.len() <= set.rank()
+}
+
+/// Whether a log that tells the base parameters with this `covariance` identifies the arm.
+pub(super) fn tells_the_arm(arm: &Arm, set: &BaseSet, covariance: &Covariance) -> bool {
+    let quantile = covariance.quantile_95();
+    let half_width: Vec<f64> = covariance.sigma().iter().map(|s| quantile * s).collect();
+    identifies_the_arm(arm, set, &not_identified(arm, set, &half_width))
 }
 
 /// Base parameters whose 95 % interval (half-width `half_width[k]`) is wider than

@@ -121,6 +121,20 @@ pub enum LogWarning {
         /// Rows per second.
         rate_hz: f64,
     },
+    /// The clock that stamped the rows was set while the arm moved on; evenly sampled rows go on evenly through it.
+    ClockSet {
+        /// How many times.
+        times: usize,
+        /// The row before the first time.
+        after_row: usize,
+        /// By how much it was set there, s; negative if it was set back.
+        first_s: f64,
+    },
+    /// The clock that stamped the rows ran unevenly against the sampling; evenly sampled rows stay evenly apart.
+    ClockWanders {
+        /// How far the stamps wander about even steps, s.
+        wander_s: f64,
+    },
     /// The recorder held rows back and wrote them in bursts, stamped with the time of writing; they are spaced evenly
     /// instead.
     LateBursts {
@@ -234,6 +248,16 @@ impl fmt::Display for LogWarning {
                 "time stamps scatter by {:.2} ms (rms), as times of arrival do: rows are taken to be evenly apart, {rate_hz:.3} a second, as the \
                  motion says that they are",
                 1e3 * rms_s
+            ),
+            Self::ClockSet { times, after_row, first_s } => write!(
+                f,
+                "the clock of the time stamps was set while the arm moved on (times: {times}, the first after row {after_row}, by {first_s:+.4} s): \
+                 rows are taken to be evenly apart there, as the motion says that they are"
+            ),
+            Self::ClockWanders { wander_s } => write!(
+                f,
+                "time stamps wander by {:.1} ms about even steps, as those of a clock that is slewed do: rows are taken to be evenly apart",
+                1e3 * wander_s
             ),
             Self::LateBursts { rows, bursts, after_row, latest_s } => write!(
                 f,

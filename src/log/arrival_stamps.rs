@@ -3,11 +3,13 @@
 //! A controller samples evenly and sends each row over a network to a program, which reads its own clock as the row
 //! arrives. Such stamps are late by a time of their own each, and for some rows the next one has arrived first. Rows of
 //! which none was lost lie on the straight line through all stamps. The motion decides whether they were sampled there:
-//! if the sampling itself was uneven, the angles follow from the velocities on the stamps as they are.
+//! if the sampling itself was uneven, the angles follow from the velocities on the stamps as they are. Logs of which rows
+//! were lost, or whose clock was set, are left to [`stamp_pieces`](super::stamp_pieces).
 
 use super::account::LogWarning;
 use super::clean::Motion;
 use super::even_stamps::{FEWEST_ROWS, StampLine, spread};
+use crate::median::median;
 
 /// A step scatters if it differs from the usual step by more than this fraction of it, ...
 const SCATTERS: f64 = 0.1;
@@ -16,10 +18,12 @@ const SCATTERS: f64 = 0.1;
 const COMMON: f64 = 0.2;
 /// Rows among which one in [`PROMPT`] is looked for that was hardly late, to see whether it is as late everywhere. Such a
 /// row is known far better than the typical one, because lateness has no upper end.
-const WINDOW: usize = 128;
+pub(super) const WINDOW: usize = 128;
 const PROMPT: usize = 10;
 /// A row that was lost moves all later stamps by one step. Half of that, between windows, is no scatter.
-const LOST: f64 = 0.5;
+pub(super) const LOST: f64 = 0.5;
+/// Rows over which the usual step is taken that does not depend on the rest of the log.
+const STRETCH: usize = 32;
 
 /// Returns even stamps for rows whose own stamps scatter about them, and the warning that reports the repair; `None` if
 /// few of them do, if rows or time were lost, or if the motion does not tell that the rows were sampled evenly.
@@ -34,23 +38,46 @@ pub(super) fn arrival_stamps(motion: &Motion) -> Option<(Vec<f64>, LogWarning)> 
     if (scattered as f64) < COMMON * (off_s.len() - 1) as f64 {
         return None;
     }
-    let prompt_s = |window: &[f64]| {
-        let mut off_s = window.to_vec();
-        *off_s.select_nth_unstable_by(window.len() / PROMPT, f64::total_cmp).1
-    };
-    let is_as_late_everywhere =
-        spread(off_s.chunks_exact(WINDOW.min(off_s.len())).map(prompt_s)) <= LOST * step_s;
+    let is_as_late_everywhere = wander_s(off_s) <= LOST * step_s;
     let warning = LogWarning::ArrivalStamps { rms_s: line.rms_s(), rate_hz: 1.0 / step_s };
     (is_as_late_everywhere && line.is_told_by(motion)).then_some((line.even_s, warning))
 }
 
+/// Whether many of the rows come earlier or later after the row before than usual. That usual step is the one of short
+/// stretches, which neither single bursts of rows nor a clock that was set change.
+pub(super) fn scatter_is_common(motion: &Motion) -> bool {
+    let (time_s, row, rows) = (motion.time_s, motion.row, motion.rows());
+    if rows < FEWEST_ROWS {
+        return false;
+    }
+    let step_s = |from: usize, to: usize| {
+        (time_s[to] - time_s[from]) / row[to].abs_diff(row[from]).max(1) as f64
+    };
+    let mut steps_s: Vec<f64> = (STRETCH..rows).map(|k| step_s(k - STRETCH, k)).collect();
+    let usual_s = median(&mut steps_s).unwrap_or(0.0);
+    let scatters = |k: &usize| (step_s(k - 1, *k) - usual_s).abs() > SCATTERS * usual_s;
+    let scattered = (1..rows).filter(scatters).count();
+    usual_s > 0.0 && scattered as f64 >= COMMON * (rows - 1) as f64
+}
+
+/// Lateness of the promptest rows of a window, s; all windows have rows.
+pub(super) fn prompt_s(window: &[f64]) -> f64 {
+    let mut off_s = window.to_vec();
+    *off_s.select_nth_unstable_by(window.len() / PROMPT, f64::total_cmp).1
+}
+
+/// How far the lateness `off_s` of the promptest rows wanders from window to window, s.
+pub(super) fn wander_s(off_s: &[f64]) -> f64 {
+    spread(off_s.chunks_exact(WINDOW.min(off_s.len())).map(prompt_s))
+}
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-    const ROWS: usize = 2000;
-    const STEP_S: f64 = 0.004;
+    pub(in crate::log) const ROWS: usize = 2000;
+    pub(in crate::log) const STEP_S: f64 = 0.004;
 
     /// A joint that swings by 0.5 rad twice a second, sampled at `sampled_s` and stamped with `stamps_s`.
     fn repaired(sampled_s: &[f64], stamps_s: &[f64]) -> Option<Vec<f64>> {
@@ -63,7 +90,7 @@ mod tests {
     }
 
     /// Times of arrival: late by an exponential time of 3 ms, and never before the row in front.
-    fn arrivals(sampled_s: &[f64]) -> Vec<f64> {
+    pub(in crate::log) fn arrivals(sampled_s: &[f64]) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let mut last_s = 0.0f64;
         let late = |t: &f64| {
@@ -73,7 +100,7 @@ mod tests {
         sampled_s.iter().map(late).collect()
     }
 
-    fn even() -> Vec<f64> {
+    pub(in crate::log) fn even() -> Vec<f64> {
         (0..ROWS).map(|k| k as f64 * STEP_S).collect()
     }
 
@@ -112,5 +139,20 @@ mod tests {
         let late = |(k, t): (usize, &f64)| if k % 20 == 7 { t + 0.5 * STEP_S } else { *t };
         let stamps_s: Vec<f64> = sampled_s.iter().enumerate().map(late).collect();
         assert_eq!(repaired(&sampled_s, &stamps_s), None);
+    }
+
+    /// Lost rows and a clock that is set are no scatter; times of arrival are.
+    #[test]
+    fn even_steps_do_not_scatter() {
+        let scatters = |stamps_s: &[f64]| {
+            let row: Vec<usize> = (2..stamps_s.len() + 2).collect();
+            scatter_is_common(&Motion { time_s: stamps_s, q: &[], qd: &[], row: &row })
+        };
+        let mut stamps_s = even();
+        stamps_s.drain(300..500);
+        stamps_s.retain(|t| (t / STEP_S).round() % 50.0 != 0.0);
+        stamps_s[1000..].iter_mut().for_each(|t| *t += 3600.0);
+        assert!(!scatters(&stamps_s));
+        assert!(scatters(&arrivals(&even())));
     }
 }

@@ -1,6 +1,6 @@
 //! Decides which rows of a log belong to the recorded motion, and unwraps its angles.
 
-use crate::median::{median, median_step, missing_steps};
+use crate::median::{UsualStep, median, median_step};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
@@ -339,17 +339,16 @@ pub(super) fn jumps(motion: &Motion) -> Option<LogWarning> {
     })
 }
 
-/// Counts the rows that the recorder left out: the time between two rows in median steps, less the rows between them
+/// Counts the rows that the recorder left out: the time between two rows in usual steps, less the rows between them
 /// that were set aside.
 pub(super) fn missed_samples(motion: &Motion) -> Option<(usize, LogWarning)> {
-    let typical_s = median_step(motion.time_s)?;
+    let usual = UsualStep::of(motion.time_s)?;
     let (mut missed, mut gaps, mut longest_s, mut after_row) = (0_usize, 0, 0.0, 0);
     for k in 1..motion.rows() {
         let step_s = motion.time_s[k] - motion.time_s[k - 1];
         let set_aside = motion.row[k] - motion.row[k - 1] - 1;
         // Converting a float beyond the range of integers saturates, so a clock that leaps cannot overflow.
-        let here =
-            (missing_steps(motion.time_s, k, typical_s).round() as usize).saturating_sub(set_aside);
+        let here = (usual.missing_rows(motion.time_s, k) as usize).saturating_sub(set_aside);
         if here > 0 {
             missed = missed.saturating_add(here);
             gaps += 1;

@@ -86,12 +86,19 @@ pub(super) struct StampLine {
 }
 
 impl StampLine {
-    /// The line of least squares; `None` if time does not pass along it.
+    /// The line of least squares through the stamps of rows that are evenly apart in the file; `None` if time does not
+    /// pass along it.
     pub(super) fn through(motion: &Motion) -> Option<Self> {
-        let (time_s, rows) = (motion.time_s, motion.row);
-        let (first_s, first_row) = (*time_s.first()?, *rows.first()?);
+        let first_row = *motion.row.first()?;
         // Rows that were set aside still have their place in the file.
-        let place: Vec<f64> = rows.iter().map(|row| row.abs_diff(first_row) as f64).collect();
+        let place: Vec<f64> = motion.row.iter().map(|row| row.abs_diff(first_row) as f64).collect();
+        Self::along(motion.time_s, &place)
+    }
+
+    /// The line of least squares through stamps over the places of their rows, in steps; `None` if time does not pass
+    /// along it.
+    pub(super) fn along(time_s: &[f64], place: &[f64]) -> Option<Self> {
+        let first_s = *time_s.first()?;
         let count = time_s.len() as f64;
         let middle = place.iter().sum::<f64>() / count;
         let mean_s = first_s + time_s.iter().map(|t| t - first_s).sum::<f64>() / count;

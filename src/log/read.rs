@@ -20,8 +20,8 @@ const WIDTH_ROWS: usize = 50;
 /// Reads a log of an arm with `joints` joints.
 ///
 /// If the layout has no velocities, they are computed from the angles once the times are in order, as slopes of
-/// polynomials through five rows. Step 4 is then replaced: before differentiation, rows with an angle far from the
-/// median of five rows are set aside.
+/// polynomials through five rows without a jump between them. Step 4 is then replaced: before differentiation, rows
+/// with an angle far from the median of five rows are set aside.
 ///
 /// Only the columns named by the layout are kept, row by row; memory use is 8 bytes per number kept. Numbers are
 /// converted to SI units. Then, in this order:
@@ -30,10 +30,11 @@ const WIDTH_ROWS: usize = 50;
 ///    effort contain an empty field, text, NaN, an infinity, or a magnitude beyond these bounds: angle and velocity
 ///    3.6·10⁵, acceleration 3·10⁴ rad/s², current 500 A, torque 5·10⁴ Nm, temperature 1000 °C, time 10¹⁹ s.
 /// 2. Time stamps rounded more coarsely than half the sampling interval are replaced by the straight line through them,
-///    if the motion shows that the rows were sampled evenly, and so are stamps that scatter. Rows that were held back and written in one burst are
-///    spread evenly between the row before and the row after, unless the motion shows that they were really sampled
-///    that late. Then times must increase: repeated and backward times are set aside, and so are up to 8 consecutive
-///    rows whose time is far ahead.
+///    if the motion shows that the rows were sampled evenly, and so are stamps that scatter; beside these, the motion
+///    shows where rows were lost and where the clock was set. Among stamps that do not scatter, rows that were held back
+///    and written in one burst are spread evenly between the row before and the row after, unless the motion shows that
+///    they were really sampled that late. Then times must increase: repeated and backward times are set aside, and so
+///    are up to 8 consecutive rows whose time is far ahead.
 /// 3. Units are checked: Δq is compared with ∫q̇ dt, and the clock with the steps a recorder can have. Numbers that
 ///    indicate degrees, milli-, micro- or nanoseconds are an error that names the change to make in the layout. So are,
 ///    in a log without velocities, angles that move faster than 30 rad/s.

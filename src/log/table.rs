@@ -1,7 +1,7 @@
 //! The numbers of a log while it is read, column by column.
 
 use super::account::{LogWarning, Reason, RowAccount};
-use super::arrival_stamps::arrival_stamps;
+use super::arrival_stamps::{arrival_stamps, scatter_is_common};
 use super::clean;
 use super::error::LogError;
 use super::even_stamps::{EvenStamps, even_stamps};
@@ -12,9 +12,11 @@ use super::plan::Plan;
 use super::record::{Effort, Log};
 use super::row::{abridged, is_decimal_comma, parse};
 use super::slopes::slopes;
+use super::stamp_pieces::stamp_pieces;
 use super::unit_suspicion::UnitSuspicion;
 use super::units;
 use crate::robot::JointSignals;
+use crate::signal::Tears;
 
 /// The numbers read so far, column by column, and the row of the file that each one came from.
 pub(super) struct Table {
@@ -168,19 +170,13 @@ impl Table {
         }
     }
 
-    /// Repairs time stamps that are rounded, scatter or are late where the motion contradicts them; returns the warning
-    /// that reports the repair.
-    fn restamp(&mut self, plan: &Plan) -> Option<LogWarning> {
-        let motion = self.motion(plan);
-        let (time_s, warning) = match even_stamps(&motion) {
-            Some(EvenStamps { time_s, resolution_s, rate_hz }) => {
-                (time_s, LogWarning::RoundedStamps { resolution_s, rate_hz })
-            }
-            None => arrival_stamps(&motion).or_else(|| late_bursts(&motion))?,
-        };
+    /// Repairs time stamps that are rounded, scatter or are late where the motion contradicts them; returns the warnings
+    /// that report the repair.
+    fn restamp(&mut self, plan: &Plan) -> Vec<LogWarning> {
+        let Some((time_s, warnings)) = restamped(&self.motion(plan)) else { return Vec::new() };
         let (time, ..) = motion_ranges(plan);
         self.columns[time] = time_s;
-        Some(warning)
+        warnings
     }
 
     /// Computes the velocities of a file that has none, after unwrapping the angles and setting wild ones aside.
@@ -200,8 +196,9 @@ impl Table {
             format!("{} = {}", plan.fields[c].place(), table.columns[c][k])
         });
         self.require_two(account, file)?;
+        let tears = Tears::of(&self.columns[time], &self.columns[q.clone()]);
         for (q, qd) in q.zip(qd) {
-            self.columns[qd] = slopes(&self.columns[time], &self.columns[q]);
+            self.columns[qd] = slopes(&self.columns[time], &self.columns[q], &tears);
         }
         warnings.push(LogWarning::SlopesOfAngles);
         Ok(warnings)
@@ -319,6 +316,22 @@ impl Table {
     fn signals(&mut self, range: std::ops::Range<usize>) -> JointSignals {
         let columns: Vec<Vec<f64>> = self.columns[range].iter_mut().map(std::mem::take).collect();
         JointSignals::from_fn(columns.len(), self.rows.len(), |j, k| columns[j][k])
+    }
+}
+
+/// The time stamps of `motion` after their repair, and the warnings that report it; `None` if nothing is repaired.
+fn restamped(motion: &clean::Motion) -> Option<(Vec<f64>, Vec<LogWarning>)> {
+    if let Some(EvenStamps { time_s, resolution_s, rate_hz }) = even_stamps(motion) {
+        return Some((time_s, vec![LogWarning::RoundedStamps { resolution_s, rate_hz }]));
+    }
+    let with_one = |(time_s, warning)| (time_s, vec![warning]);
+    if let Some(on_a_line) = arrival_stamps(motion) {
+        return Some(with_one(on_a_line));
+    }
+    match scatter_is_common(motion) {
+        // Among stamps that scatter, late rows and tiny steps are everywhere, and say nothing about bursts.
+        true => stamp_pieces(motion),
+        false => late_bursts(motion).map(with_one),
     }
 }
 

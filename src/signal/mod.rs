@@ -10,6 +10,7 @@
 //! | how to compute accelerations as the paper does? | [`PaperDifferentiator`] |
 //! | how to differentiate a smooth series? | [`central_4`] |
 //! | how to treat jittered time stamps and missing samples? | [`Resampler`], [`fill_gaps`] |
+//! | does another recording begin within a log? | [`Tears`] |
 //! | when does the arm move? | [`Activity`] |
 //! | does the motion repeat, and from where to where? | [`find_period`] |
 //! | what is the best estimate of a repeated motion and its derivatives? | [`PeriodicFit`] |
@@ -42,7 +43,9 @@ mod periods;
 mod readings;
 mod replicates;
 mod resample;
+mod slip;
 mod spectra;
+mod tears;
 
 pub use activity::Activity;
 pub use averaged_motion::{AveragedMotion, HarmonicPower};
@@ -65,3 +68,4 @@ pub use periods::{mean_period, subtract_mean_period};
 pub use readings::{reading_limit, reading_noise, resolution};
 pub use replicates::{Replicates, replicate_noise};
 pub use resample::{Gap, MOST_PER_ROW, Resampler, bridged_gap_s, gaps, natural_rate_hz};
+pub use tears::Tears;

@@ -65,6 +65,11 @@ impl PeriodicRecord {
         &self.qd_rad_s
     }
 
+    /// Whether the angles of joint `j` were read in steps so coarse that their rounding is the same in every period.
+    pub fn has_coarse_angles(&self, j: usize) -> bool {
+        self.rounding[0][j] > 0.0
+    }
+
     /// Variance of the rounding of joint `j` that repeats: of the angle, rad², and of the velocity, rad²/s².
     pub(super) fn rounding(&self, j: usize) -> [f64; 2] {
         self.rounding.each_ref().map(|of| of[j])

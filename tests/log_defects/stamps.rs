@@ -80,6 +80,62 @@ fn stamps_of_rows_that_are_written_in_bursts() {
     ));
 }
 
+/// Rows arrive late by exponential times of 4 ms, never before the row in front; two are lost, and the clock is set by
+/// 0.25 s. The line through 398 such stamps is known to 4 ms·√12/√398, 0.7 ms, over the log, and the size of the step to
+/// 4 ms/3·√(2/128), 0.17 ms, which turns the line by 0.2 ms; the bound is four times both.
+#[test]
+fn stamps_of_rows_that_arrive_late_beside_lost_ones_and_a_clock_that_is_set() {
+    let lost = [100_usize, 320];
+    let log = edited(|rows| {
+        let mut last_s = 0.0_f64;
+        for (k, row) in rows[1..].iter_mut().enumerate() {
+            let chance = ((k * 7919) % 1009 + 1) as f64 / 1010.0;
+            let sampled_s: f64 = row[0].parse().unwrap();
+            last_s = last_s.max(sampled_s - 4e-3 * chance.ln());
+            let set_s = if k < 250 { 0.0 } else { 0.25 };
+            row[0] = (last_s + set_s).to_string();
+        }
+        lost.iter().rev().for_each(|k| drop(rows.remove(k + 1)));
+    })
+    .unwrap();
+    assert_eq!((log.samples(), log.rows.missed_samples), (SAMPLES - 2, 2), "{}", log.rows);
+    let sampled_s: Vec<f64> =
+        (0..SAMPLES).filter(|k| !lost.contains(k)).map(|k| 100.0 + STEP_S * k as f64).collect();
+    let late_s = |k: usize| log.time_s[k] - sampled_s[k];
+    for k in 0..log.samples() {
+        assert!((late_s(k) - late_s(0)).abs() < 3e-3, "{k}: {} {}", late_s(k), late_s(0));
+    }
+    // Sample 249 is in row 250, as one before it was lost.
+    let [
+        LogWarning::ArrivalStamps { .. },
+        LogWarning::ClockSet { times: 1, after_row: 250, first_s },
+        LogWarning::MissedSamples { missed: 2, gaps: 2, .. },
+    ] = log.rows.warnings[..]
+    else {
+        panic!("{}", log.rows)
+    };
+    assert!((first_s - 0.25).abs() < 1e-3, "{first_s}");
+}
+
+/// A recorder that reads the arm every 2 to 14 ms: the stamps are right, and no row is missing.
+#[test]
+fn rows_that_are_sampled_unevenly_are_all_there() {
+    let log = edited(|rows| {
+        let mut t = 100.0_f64;
+        for (k, row) in rows[1..].iter_mut().enumerate() {
+            row[0] = t.to_string();
+            for j in 0..JOINTS {
+                row[1 + j] = angle_rad(j, t).to_string();
+                row[1 + JOINTS + j] = velocity_rad_s(j, t).to_string();
+            }
+            t += 0.002 + 0.003 * ((k * 7919) % 1009 % 5) as f64;
+        }
+    })
+    .unwrap();
+    assert_eq!((log.samples(), log.rows.missed_samples), (SAMPLES, 0), "{}", log.rows);
+    assert_eq!(log.rows.warnings, [], "{}", log.rows);
+}
+
 #[test]
 fn repeated_and_backward_times() {
     let result = edited(|rows| rows[51][0] = rows[50][0].clone());

@@ -20,7 +20,7 @@ mod link_length;
 pub(super) mod load_friction;
 mod nonlinear_viscous;
 mod position_friction;
-mod presliding;
+pub(super) mod presliding;
 mod reversal_width;
 pub(super) mod ripple;
 mod saturation;
@@ -300,8 +300,8 @@ pub trait Candidate: Sync {
     /// The effect in words, to which its parameters are appended: "friction that grows with load".
     fn in_words(&self) -> &'static str;
 
-    /// [`Self::in_words`] of the effect with the coefficients `b`, where its sign changes what it is called.
-    fn in_words_of(&self, _b: &[f64]) -> &'static str {
+    /// [`Self::in_words`] of the effect with this `shape` and the coefficients `b`, where these change what it is called.
+    fn in_words_of(&self, _shape: Shape, _b: &[f64]) -> &'static str {
         self.in_words()
     }
 

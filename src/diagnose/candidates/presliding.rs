@@ -14,11 +14,17 @@
 //! joint turns. A constant lead, as in the null model, cannot follow that. The torque of the drive is therefore
 //! simulated along with the bristles ([`column`]); the kind of drive is a variant of the law.
 //!
+//! Where a joint rests between its moves, dry friction holds whatever is left to hold, which depends on how the joint came
+//! to rest: bristles that are stiff turn round within the noise of the averaged angles, and friction that is stuck has no
+//! law at all. Further variants therefore have one coefficient per rest, the friction held there: beside bristles that
+//! turn round while the joint moves, or alone ([`HELD`]), which says nothing of a stiffness.
+//!
 //! In a single run, the angle is followed with play: it moves only as far as the uncertainty of the recorded angles
 //! (their rounding) demands. Without this play, rounding at standstill would shake the friction loose.
 
 use super::*;
-use crate::diagnose::bristles::{Bristles, DRIVES, Way, column};
+use crate::diagnose::bristles::{Bristles, DRIVES, Drive, Way, column};
+use crate::diagnose::rests::rests;
 
 /// See the module.
 pub struct Presliding;
@@ -32,8 +38,45 @@ const MOST_ERROR: f64 = 0.15;
 /// Range of stiffnesses that is searched, 1/rad.
 const STIFFNESSES_PER_RAD: [f64; 2] = [20.0, 100_000.0];
 
-/// Variants from this one on have damped bristles, behind the same drives as [`DRIVES`].
-const DAMPED: usize = DRIVES.len();
+/// Parts of the law; each but the last comes with every one of the [`DRIVES`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Part {
+    /// Undamped bristles alone.
+    Bristles,
+    /// Damped bristles.
+    Damped,
+    /// Bristles, and what the joint holds where it rests.
+    BesideRests,
+    /// What the joint holds where it rests, and nothing of how it builds up.
+    Rests,
+}
+
+impl Part {
+    fn of(shape: Shape) -> Self {
+        match shape.variant / DRIVES.len() {
+            0 => Self::Bristles,
+            1 => Self::Damped,
+            2 => Self::BesideRests,
+            _ => Self::Rests,
+        }
+    }
+
+    /// The variants of this part.
+    fn variants(self) -> std::ops::Range<usize> {
+        let first = self as usize * DRIVES.len();
+        first..first + DRIVES.len()
+    }
+}
+
+/// Variant in which a joint that rests holds some friction, and nothing is said of how it builds up.
+pub const HELD: usize = 3 * DRIVES.len();
+/// The shape of [`HELD`], which has no nonlinear parameter.
+const IS_HELD: Shape = Shape { variant: HELD, value: 1.0 };
+/// Number of drives behind which bristles beside rests are searched; the others are tried where the law was found.
+const DRIVES_BESIDE_RESTS: usize = 2;
+/// Stiffnesses of bristles beside rests, 1/rad, that are started from. Softer ones are followed through the rests.
+const STIFF_PER_RAD: [f64; 2] = [1e3, 100_000.0];
+
 /// T, s, over which the derivative by T is taken: the torque of a drive that feeds friction forward is not quite linear in
 /// T. LuGre models have dampings of some milliseconds.
 const DAMPING_STEP_S: f64 = 1e-3;
@@ -44,12 +87,25 @@ const LEAST_SHARE: f64 = 0.7;
 /// The same for a single run, whose low-pass is slower than most of a reversal. Torques that are recorded 4 ms late
 /// give shares of 0.13 to 0.16, a soft gear 0.07.
 const LEAST_SHARE_OF_A_RUN: f64 = 0.25;
+/// The same beside rests, where the noise of the angles at which a joint stops turns bristles round too early.
+const LEAST_SHARE_BESIDE_RESTS: f64 = 0.25;
+/// Largest friction that a joint may hold at rest, relative to its dry friction while it moves: static friction may be
+/// larger (a Stribeck curve), but not by far.
+const MOST_HELD: f64 = 1.5;
+
+/// Root mean square of the friction held at rests.
+fn rms(b: &[f64]) -> f64 {
+    (b.iter().map(|b| b * b).sum::<f64>() / b.len() as f64).sqrt()
+}
 
 /// Starting stiffnesses of a variant. With the reaction of a drive, there is one optimum between neighbours of a coarser
 /// grid as well.
 fn grid(variant: usize) -> impl Iterator<Item = Shape> {
-    let [softest, stiffest] = STIFFNESSES_PER_RAD;
-    let count = if variant.is_multiple_of(DAMPED) { 13 } else { 7 };
+    let answers = DRIVES[variant % DRIVES.len()] != Drive::BySign;
+    let ([softest, stiffest], count) = match Part::of(Shape { variant, value: 0.0 }) {
+        Part::BesideRests => (STIFF_PER_RAD, 5),
+        _ => (STIFFNESSES_PER_RAD, if answers { 7 } else { 13 }),
+    };
     geometric(softest, stiffest, count).map(move |value| Shape { variant, value })
 }
 
@@ -58,13 +114,29 @@ impl Candidate for Presliding {
         Kind::Presliding
     }
 
-    fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        let variants = if scene.periodic { DRIVES.len() } else { 1 };
-        (0..variants).flat_map(grid).collect()
+    fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
+        let variants = if scene.periodic { Part::Bristles.variants() } else { 0..1 };
+        let mut shapes: Vec<Shape> = variants.flat_map(grid).collect();
+        if !rests(scene, joint(site)).is_empty() {
+            let beside = Part::BesideRests.variants().take(DRIVES_BESIDE_RESTS);
+            shapes.extend(beside.flat_map(grid).chain([IS_HELD]));
+        }
+        shapes
     }
 
     fn richer_shapes(&self, scene: &Scene) -> Vec<Shape> {
-        let variants = if scene.periodic { DAMPED..2 * DAMPED } else { 0..0 };
+        let variants = if scene.periodic { Part::Damped.variants() } else { 0..0 };
+        variants.flat_map(grid).collect()
+    }
+
+    fn finer_shapes(&self, _: &Scene, _: Option<usize>, shape: Shape) -> Vec<Shape> {
+        let variants = match Part::of(shape) {
+            Part::Bristles | Part::Damped => 0..0,
+            Part::BesideRests | Part::Rests => {
+                let all = Part::BesideRests.variants();
+                all.start + DRIVES_BESIDE_RESTS..all.end
+            }
+        };
         variants.flat_map(grid).collect()
     }
 
@@ -92,37 +164,59 @@ impl Candidate for Presliding {
             Some(of_curve) => dry.minus(of_curve),
             None => dry,
         };
-        shapes
-            .iter()
-            .map(|shape| {
-                let z = way.deflection(shape.value, curve);
-                let drive = DRIVES[shape.variant % DAMPED];
-                let dry = column(scene, j, &way, &z, drive);
-                if shape.variant < DAMPED {
-                    return vec![less(dry)];
-                }
+        let rests = rests(scene, j);
+        let held = || rests.iter().map(|rest| Column::on(j, rest.clone()));
+        let of_shape = |shape: &Shape| {
+            let part = Part::of(*shape);
+            if part == Part::Rests {
+                return held().collect();
+            }
+            let mut z = way.deflection(shape.value, curve);
+            if part == Part::BesideRests {
+                let ticks = z.len() / scene.samples();
+                let at_rest = |k: usize| rests.iter().any(|rest| rest[k / ticks] == 1.0);
+                z.iter_mut().enumerate().filter(|(k, _)| at_rest(*k)).for_each(|(_, z)| *z = 0.0);
+            }
+            let drive = DRIVES[shape.variant % DRIVES.len()];
+            let dry = column(scene, j, &way, &z, drive);
+            if part == Part::Damped {
                 let damped = way.damped(&z, shape.value, curve, DAMPING_STEP_S);
                 let more = column(scene, j, &way, &damped, drive).minus(&dry);
-                vec![less(dry), more.scaled(1.0 / DAMPING_STEP_S)]
-            })
-            .collect()
+                return vec![less(dry), more.scaled(1.0 / DAMPING_STEP_S)];
+            }
+            let own = std::iter::once(less(dry));
+            if part == Part::BesideRests { own.chain(held()).collect() } else { own.collect() }
+        };
+        shapes.iter().map(of_shape).collect()
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
+        let held = |b: &[f64]| quantity("held_nm", rms(b), "Nm");
+        let part = Part::of(shape);
+        if part == Part::Rests {
+            return vec![held(b)];
+        }
         let mut out = vec![
             quantity("stiffness_per_rad", shape.value, "1/rad"),
             quantity("coulomb_nm", b[0], "Nm"),
         ];
-        out.extend(b.get(1).map(|damping| quantity("damping_s", damping / b[0], "s")));
+        if part == Part::BesideRests && b.len() > 1 {
+            out.push(held(&b[1..]));
+        }
+        if part == Part::Damped {
+            out.extend(b.get(1).map(|damping| quantity("damping_s", damping / b[0], "s")));
+        }
         out
     }
 
     fn bristles(&self, shape: Shape, b: &[f64]) -> Option<Bristles> {
-        (b[0] > 0.0).then(|| Bristles {
+        let part = Part::of(shape);
+        let damping = if part == Part::Damped { second(b).max(0.0) } else { 0.0 };
+        (part != Part::Rests && b[0] > 0.0).then(|| Bristles {
             stiffness_per_rad: shape.value,
-            damping_s: second(b).max(0.0) / b[0],
+            damping_s: damping / b[0],
             coulomb_nm: b[0],
-            drive: DRIVES[shape.variant % DAMPED],
+            drive: DRIVES[shape.variant % DRIVES.len()],
             curve: None,
         })
     }
@@ -132,7 +226,11 @@ impl Candidate for Presliding {
     }
 
     fn form_error(&self, scene: &Scene, shape: Shape) -> f64 {
-        if scene.periodic { (TURN_RAD * shape.value).min(MOST_ERROR) } else { 0.0 }
+        if scene.periodic && Part::of(shape) != Part::Rests {
+            (TURN_RAD * shape.value).min(MOST_ERROR)
+        } else {
+            0.0
+        }
     }
 
     fn separating_experiment(&self) -> &'static str {
@@ -143,23 +241,47 @@ impl Candidate for Presliding {
         0.0
     }
 
-    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
-        b[0] > 0.0 && second(b) >= 0.0
+    fn is_possible(&self, shape: Shape, b: &[f64]) -> bool {
+        match Part::of(shape) {
+            Part::Rests => true,
+            Part::BesideRests => b[0] > 0.0,
+            Part::Bristles | Part::Damped => b[0] > 0.0 && second(b) >= 0.0,
+        }
     }
 
     /// All dry friction of a joint builds up after a reversal. Where some of it does not, something else happens there:
     /// a torque recorded late, or another dependence on speed.
-    fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
-        let least = if scene.periodic { LEAST_SHARE } else { LEAST_SHARE_OF_A_RUN };
+    fn is_its_own(&self, scene: &Scene, site: Option<usize>, shape: Shape, b: &[f64]) -> bool {
+        if Part::of(shape) == Part::Rests {
+            return rms(b) < MOST_HELD * scene.coulomb_nm[joint(site)];
+        }
+        let least = match Part::of(shape) {
+            Part::Bristles | Part::Damped if scene.periodic => LEAST_SHARE,
+            Part::BesideRests => LEAST_SHARE_BESIDE_RESTS,
+            _ => LEAST_SHARE_OF_A_RUN,
+        };
         b[0] > least * scene.coulomb_nm[joint(site)]
     }
 
     fn form(&self, _: &Scene, shape: Shape) -> Option<&'static str> {
-        (shape.variant >= DAMPED).then_some("damped bristles")
+        match Part::of(shape) {
+            Part::Bristles => None,
+            Part::Damped => Some("damped bristles"),
+            Part::BesideRests | Part::Rests => Some("held at rest"),
+        }
     }
 
     fn in_words(&self) -> &'static str {
         "friction that builds up over a small angle behind every reversal (presliding)"
+    }
+
+    fn in_words_of(&self, shape: Shape, _: &[f64]) -> &'static str {
+        match Part::of(shape) {
+            Part::Rests => {
+                "friction that holds it at rest between its moves (presliding or static friction)"
+            }
+            _ => self.in_words(),
+        }
     }
 }
 

@@ -122,7 +122,7 @@ impl Candidate for TimeSkew {
         "torque that is recorded later than the motion"
     }
 
-    fn in_words_of(&self, b: &[f64]) -> &'static str {
+    fn in_words_of(&self, _: Shape, b: &[f64]) -> &'static str {
         match b {
             [delay_s, ..] if *delay_s < 0.0 => "torque that is recorded earlier than the motion",
             _ => self.in_words(),
@@ -140,8 +140,9 @@ mod tests {
 
     #[test]
     fn a_negative_delay_is_early() {
-        assert!(TimeSkew.in_words_of(&[-1e-3]).contains("earlier"));
-        assert_eq!(TimeSkew.in_words_of(&[1e-3]), TimeSkew.in_words());
+        let shape = Shape { variant: 0, value: 0.0 };
+        assert!(TimeSkew.in_words_of(shape, &[-1e-3]).contains("earlier"));
+        assert_eq!(TimeSkew.in_words_of(shape, &[1e-3]), TimeSkew.in_words());
     }
 
     /// Whether the change is proportional to the delay or to its square, some starting shape accepts every delay up to

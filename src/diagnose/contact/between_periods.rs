@@ -11,9 +11,8 @@ use super::bump::Push;
 use super::disturbed::with_disturbed_periods;
 use super::repeats::{FEWEST_PERIODS, Repeats};
 use super::{Touch, are_near};
-use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::verdict::Cause;
-use crate::identify::Measurement;
+use crate::identify::{FrictionDrift, Measurement};
 use crate::robot::JointSignals;
 use crate::signal::{
     Resampler, SignalError, bridged_gap_s, find_period, linear_at, natural_rate_hz,

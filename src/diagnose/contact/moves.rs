@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::are_near;
 use super::repeats::Repeats;
-use crate::diagnose::friction_drift::FrictionDrift;
+use crate::identify::FrictionDrift;
 use crate::median::robust_sigma;
 use crate::robot::JointSignals;
 use crate::signal::{SignalError, cubic_at};

@@ -15,6 +15,7 @@
 
 use crate::diagnose::candidates::elasticity::{ON_MOTOR, damping_ratio};
 use crate::diagnose::candidates::load_friction::{MOTOR_SIDE, ROTOR};
+use crate::diagnose::candidates::presliding::HELD;
 use crate::diagnose::candidates::stribeck::{RATIONAL, STEEP_AT_REST};
 use crate::diagnose::candidates::time_skew::LOW_PASS;
 use crate::diagnose::{Channel, Kind, RecordFault};
@@ -45,6 +46,8 @@ const OTHER_ROWS: &str =
 const OTHER_CHANNEL: &str = "the simulated record has wild readings of the torque alone";
 const OTHER_ROTOR: &str =
     "the simulated arm has the rotor of the robot's file, with which its gear carries another load";
+const UNKNOWN_AT_REST: &str =
+    "how much friction a joint holds at rest depends on how it came to rest, which no law tells";
 const INCOMPLETE: &str = "the log does not tell all of its numbers";
 
 /// Stiffest bristles that are simulated, 1/rad. Friction then turns round within 0.1 mrad, less than a joint moves in
@@ -143,6 +146,9 @@ impl DiagnosedCause<'_> {
             Kind::LoadFriction => return self.of_load(),
             // Sliding friction is the arm's own. The value that the family fits to the reversals alone is the same
             // quantity, known less well.
+            Kind::Presliding if self.variant == HELD => {
+                return Some(Counterpart::None(UNKNOWN_AT_REST));
+            }
             Kind::Presliding => Effect::Presliding(faults::Presliding {
                 joint: self.joint?,
                 stiffness_per_rad: value("stiffness_per_rad")?.min(STIFFEST_PER_RAD),

@@ -11,6 +11,7 @@ pub use other_friction::{OtherFriction, SHARPEST, Turn};
 
 use fourier::Complex64;
 
+use super::coarse_angles::CoarseAngles;
 use super::lateness::Lateness;
 use super::load::{Delivered, LinkTorque, Loads, Periods, RigidArm, rigid_torque_along};
 use super::reversal_answer::shifted;
@@ -71,6 +72,9 @@ pub struct Scene {
     pub noise_nm: Vec<f64>,
     /// Estimated Coulomb friction, Nm.
     pub coulomb_nm: Vec<f64>,
+    /// Error of the velocity of every joint where it reverses, rad/s, as far as coarse angles make it; zero where angles
+    /// are fine.
+    pub velocity_error_rad_s: Vec<f64>,
     /// What is known of the friction of every joint beside Coulomb and viscous friction.
     other_friction: Vec<OtherFriction>,
     /// Mass matrix of the links along the motion, kg m², column by column.
@@ -154,12 +158,17 @@ impl Scene {
         // Rounded to a resolution Δ, the true angle lies within ±Δ/2.
         let doubt = |resolution: &f64| if periodic { 0.0 } else { 0.5 * resolution };
         let is_described = |joint: &Joint| joint.drive.rotor_inertia_kg_m2 > 0.0;
+        let velocity_error = |j: usize| {
+            let coarse = CoarseAngles::of(prepared, j, nominal.friction_epsilon_rad_s);
+            coarse.map_or(0.0, |angles| angles.error_rad_s)
+        };
         let is_told = |j: usize| set.index_of(Parameter::RotorInertia(j)).is_some();
         Self {
             noise_nm: (0..joints).map(|j| noise_of_a_free_reading(prepared, j)).collect(),
             angle_doubt_rad: prepared.angle_resolution_rad.iter().map(doubt).collect(),
             torque_limit_nm: prepared.torque_limit_nm.clone(),
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
+            velocity_error_rad_s: (0..joints).map(velocity_error).collect(),
             other_friction: vec![OtherFriction::default(); joints],
             has_described_rotor: nominal.joints.iter().map(is_described).collect(),
             tells_rotor: (0..joints).map(is_told).collect(),

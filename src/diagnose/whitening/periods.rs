@@ -8,11 +8,10 @@ use super::repeating::RepeatingNoise;
 use super::scatter::{FLOOR, Noise, Periods, Scatter};
 use super::steps::steps;
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::image::{Column, Image};
 use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty, rows_of};
 use crate::diagnose::scene::Scene;
-use crate::identify::{Panel, Regression};
+use crate::identify::{FrictionDrift, Panel, Regression};
 use crate::robot::JointSignals;
 use crate::signal::pooled_level;
 

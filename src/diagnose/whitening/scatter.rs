@@ -4,16 +4,11 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::coherence::coherence;
 use super::mean_noise::{drifts, with_own_scatter};
-use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::image::Column;
 use crate::diagnose::noise_power::Uncertainty;
+use crate::identify::FrictionDrift;
 use crate::signal::{NoisePower, noise_trends, pooled_level};
 
-/// Least share of the scatter that counts as kept when drifting friction is removed. With two periods, the removal may
-/// take most of what a slow harmonic says of noise; with eight, 5 to 15 %. The remaining scatter is divided by the
-/// share that would remain of white noise. For noise that rises as the sum of two colours, the result is 0.96 to 1.08
-/// of the true power.
-const LEAST_KEPT: f64 = 0.25;
 /// Torque below this share of a joint's rms torque cannot be distinguished from rounding in a model.
 pub const FLOOR: f64 = 1e-4;
 
@@ -168,15 +163,7 @@ fn between(
     let mut kept: Vec<Vec<f64>> = Vec::new();
     for (j, y) in &torque.parts {
         spectra.extend(y.chunks_exact(n).map(&spectrum));
-        let mut lost = vec![0.0; n / 2 + 1];
-        for direction in drift.directions(*j) {
-            for period in direction.chunks_exact(n) {
-                let spectrum = spectrum(period);
-                lost.iter_mut().zip(&spectrum).for_each(|(lost, c)| *lost += c.norm_sqr());
-            }
-        }
-        let share = |lost: &f64| (1.0 - lost / freedom).max(LEAST_KEPT).sqrt();
-        kept.push(lost.iter().map(share).collect());
+        kept.push(drift.kept(*j, n, &spectrum));
     }
     let of_harmonic = |k: usize| {
         let mut scatter = DMatrix::zeros(joints, joints);

@@ -15,5 +15,5 @@ pub(super) use autoregression::{autoregression, prewhiten};
 pub(super) use cross_joint::{decorrelate, mix};
 pub(super) use decimate::decimate;
 pub(super) use instruments::{SMOOTHER, instrument, smoothed};
-pub(super) use replicates::ReplicateWhitening;
+pub(super) use replicates::{ROWS_END, ReplicateWhitening, noise_of_rows};
 pub use spectrum::Spectrum;

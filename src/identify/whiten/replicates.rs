@@ -36,7 +36,7 @@ pub struct ReplicateWhitening {
 }
 
 /// Highest frequency of the rows used, over the sampling rate.
-const ROWS_END: f64 = 0.08;
+pub const ROWS_END: f64 = 0.08;
 /// Largest noise in the acceleration of the rows used, as a share of its mean square. Ten times as much (velocity
 /// noise of 0.01 rad/s, eight periods) attenuated the inertia about joint 1 by 5e-5, a tenth of its σ; half as much
 /// costs 1 % of σ under noise with a memory.
@@ -58,18 +58,13 @@ impl ReplicateWhitening {
         let harmonics = (harmonics as usize).max(LEAST_HARMONICS);
         let rows = self.rows.get_or_insert_with(|| Problem::new(problem.plan.clone(), 0.0));
         self.spectrum.transform(problem, harmonics, rows);
-        let (n, periods) = (rows.samples, rows.periods);
+        let n = rows.samples;
         let mut deviations: Vec<Vec<f64>> = rows.panels.iter().map(|p| p.y.clone()).collect();
         self.weights.resize(rows.joints(), Vec::new());
         let mut noisiest: f64 = 0.0;
         for (deviations, weights) in deviations.iter_mut().zip(&mut self.weights) {
             subtract_mean_period(deviations, n);
-            *weights = vec![0.0; n];
-            for period in deviations.chunks_exact(n) {
-                weights.iter_mut().zip(period).for_each(|(w, d)| *w += d * d);
-            }
-            weights.iter_mut().for_each(|w| *w /= (periods - 1) as f64);
-            smooth(weights);
+            *weights = noise_of_rows(deviations, n);
             noisiest = weights.iter().fold(noisiest, |a, w| a.max(*w));
         }
         let floor = (LEAST_NOISE.powi(2) * noisiest).max(f64::MIN_POSITIVE);
@@ -88,6 +83,19 @@ impl ReplicateWhitening {
         });
         mix(rows, &self.weights, &correlation, out);
     }
+}
+
+/// Variance of the noise in each of the `n` rows of a period: that of the neighbouring harmonics, by the `deviations` of
+/// all periods from their mean.
+pub fn noise_of_rows(deviations: &[f64], n: usize) -> Vec<f64> {
+    let mut variances = vec![0.0; n];
+    for period in deviations.chunks_exact(n) {
+        variances.iter_mut().zip(period).for_each(|(w, d)| *w += d * d);
+    }
+    let periods = deviations.len() / n;
+    variances.iter_mut().for_each(|w| *w /= (periods - 1) as f64);
+    smooth(&mut variances);
+    variances
 }
 
 /// Correlation of the deviations of two joints, period after period, over the rows in which both have weight; 0 if one

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::Training;
+use super::drift;
 use crate::identify::{
     Agreement, Floor, Identification, LackOfFit, Lowered, MANY_PERIODS, Processing,
     by_noise_in_words,
@@ -90,8 +91,17 @@ pub struct TestResult {
 }
 
 impl Intervals {
-    /// Judges the intervals by the tests of lack of fit and of agreement.
+    /// Judges the intervals by the tests of lack of fit and of agreement. These know nothing of friction that drifts,
+    /// which is told beside them.
     pub fn of(training: &Training) -> Self {
+        let judged = Self::of_tests(training);
+        match drift::means_in_words(training) {
+            Some(means) => Self { reason: format!("{} {means}", judged.reason), ..judged },
+            None => judged,
+        }
+    }
+
+    fn of_tests(training: &Training) -> Self {
         let alone = Self::of_fit(training.identification, &training.regression.lowered);
         let Some(agreement) = &training.identification.agreement else { return alone };
         let result = AgreementResult::of(agreement, training);

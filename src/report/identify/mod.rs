@@ -4,6 +4,7 @@
 //! JSON, or the reason why there is none ([`Declined`]), and a [`Page`](crate::report::Page).
 
 mod declined;
+mod drift;
 mod foreign;
 mod intervals;
 mod page;
@@ -15,6 +16,7 @@ use serde::Serialize;
 
 pub use declined::{Declined, NOTHING_MOVES};
 use declined::{remedy, rest_in_words};
+pub use drift::DriftResult;
 pub use intervals::{AgreementResult, Intervals, TestResult};
 pub use page::{facts, page, parameter_table, residual_table};
 
@@ -91,12 +93,12 @@ impl Training<'_> {
             return Some(Doubt::contradiction(self.named(log, misreading.sentence())));
         }
         let doubt = Doubt::of(
-            arm,
-            set,
+            (*arm, *set),
             self.nominal,
             &identification.fit.theta,
             &identification.sigma(),
             &identification.covariance,
+            &self.regression.prepared.motion.q_rad,
             &identification.residual().torque_rms_nm,
         );
         Doubt::or_unlike(doubt, unlike(arm, &identification.left()))
@@ -119,6 +121,7 @@ impl Training<'_> {
         let mut warnings: Vec<String> =
             self.logs.iter().flat_map(|log| log_warnings(log)).collect();
         warnings.extend(identification.warnings.clone());
+        warnings.extend(drift::remarks(self));
         warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
         warnings.extend(few_degrees_of_freedom(identification.covariance.degrees_of_freedom));
         warnings.extend(doubt.map(Doubt::sentence));
@@ -227,6 +230,8 @@ pub struct Result {
     noise_floor_nm: Option<Vec<f64>>,
     /// Rms of the torque that repeats from period to period and that the model does not explain; null for a single run.
     explainable_nm: Option<Vec<f64>>,
+    /// Friction that drifts along the logs.
+    drifting_friction: Vec<DriftResult>,
     intervals: Intervals,
     condition: Condition,
     not_identified: Vec<String>,
@@ -330,6 +335,7 @@ impl Result {
             residual: identification.residual().into(),
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
             explainable_nm: identification.explainable_nm.clone(),
+            drifting_friction: DriftResult::all(training),
             intervals: Intervals::of(training),
             condition: Condition::of(&regression.problem, set)?,
             verdict: training.verdict(&open, doubt.as_ref()),

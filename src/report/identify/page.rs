@@ -58,6 +58,12 @@ pub fn residual_table(result: &Result) -> Table {
     }
     if let Some(explainable) = &result.explainable_nm {
         row("repeats and is not explained".into(), "Nm", explainable);
+        let drift = |j: usize| result.drifting_friction.iter().find(|drift| drift.joint == j + 1);
+        let of_drift: Vec<f64> =
+            (0..joints).map(|j| drift(j).map_or(0.0, |drift| drift.rms_nm)).collect();
+        if of_drift.iter().any(|nm| *nm > 0.0) {
+            row("friction that drifts, beside its mean".into(), "Nm", &of_drift);
+        }
     }
     for (v, name) in result.validation.iter().zip(validation_names(result)) {
         row(format!("{name}: prediction"), "Nm", &v.residual.rms_nm);
@@ -121,6 +127,7 @@ pub fn page(
         _ if result.is_declined() || result.is_contradicted() => Status::Bad,
         _ if result.doubt.is_some() => Status::Warn,
         Some(false) => Status::Warn,
+        _ if !result.drifting_friction.is_empty() => Status::Warn,
         _ => Status::Good,
     };
     let verdict = Verdict { status, sentence: result.sentence(), facts: facts(result) };
