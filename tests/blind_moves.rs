@@ -47,3 +47,27 @@ fn late_torque_is_named_along_moves() {
     assert_eq!((cause.kind, cause.joint), (Kind::TimeSkew, None));
     assert_holds(cause, "delay_s", 0.002);
 }
+
+/// Bristles of joint 2 that give way over half a milliradian. In each pause the joint holds what was
+/// left of its friction as it came to rest.
+#[test]
+fn friction_that_is_held_in_pauses_is_named() {
+    let hidden = "[[effect]]\nkind = \"presliding\"\njoint = 2\nstiffness_per_rad = 2000.0\n";
+    let d = diagnoses(TRAPEZOIDAL, hidden, 1).next().expect("one log");
+    let [cause] = &d.causes[..] else { panic!("{:#?}", d.sentences) };
+    assert_eq!((cause.kind, cause.joint), (Kind::Presliding, Some(2)));
+    assert_eq!(cause.form, Some("held at rest"));
+    assert_holds(cause, "stiffness_per_rad", 2000.0);
+    assert_holds(cause, "coulomb_nm", 8.0);
+}
+
+/// Bristles that turn round within a tenth of a milliradian, which the noise of the angles hides: what is held in the
+/// pauses tells them, and is named first.
+#[test]
+fn stiff_bristles_show_in_pauses() {
+    let hidden = "[[effect]]\nkind = \"presliding\"\njoint = 5\nstiffness_per_rad = 10000.0\n";
+    let d = diagnoses(TRAPEZOIDAL, hidden, 1).next().expect("one log");
+    let first = &d.causes[0];
+    assert_eq!((first.kind, first.joint), (Kind::Presliding, Some(5)), "{:#?}", d.sentences);
+    assert!(first.gain_fraction.is_some_and(|gain| gain > 0.95), "{:?}", first.gain_fraction);
+}

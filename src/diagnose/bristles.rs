@@ -141,6 +141,16 @@ impl Way {
 
     /// z at the instants, for bristles of the stiffness k that hold `curve`, if any.
     pub fn deflection(&self, stiffness_per_rad: f64, curve: Option<Curve>) -> Vec<f64> {
+        self.deflection_but(stiffness_per_rad, curve, &[])
+    }
+
+    /// [`Self::deflection`] of bristles that are free at the instants that belong to a rest ([`Self::held`]).
+    pub fn deflection_but(
+        &self,
+        stiffness_per_rad: f64,
+        curve: Option<Curve>,
+        rest_of: &[Option<usize>],
+    ) -> Vec<f64> {
         let rest = |qd_rad_s: f64| curve.map_or(1.0, |curve| curve.rest(qd_rad_s));
         let rests = self.rests(&self.mean_rad_s, curve);
         let lefts = of_pairs(
@@ -165,10 +175,40 @@ impl Way {
                     let rest = rest(0.5 * self.qd_rad_s[k]);
                     state = towards(state, back, rest, left_behind(back, stiffness_per_rad / rest));
                 }
+                if rest_of.get(k).is_some_and(Option::is_some) {
+                    state = 0.0;
+                }
                 *z = state;
             }
         }
         z
+    }
+
+    /// For each of `rests` rests, what its deflection of one makes of undamped bristles at the instants: one in the rest
+    /// itself, and what is left of it from there to the next rest. `rest_of` says to which rest an instant belongs.
+    pub fn held(
+        &self,
+        stiffness_per_rad: f64,
+        rest_of: &[Option<usize>],
+        rests: usize,
+    ) -> Vec<Vec<f64>> {
+        let n = rest_of.len();
+        let mut out = vec![vec![0.0; n]; rests];
+        let first = rest_of.iter().position(Option::is_some).unwrap_or(0);
+        let (mut last, mut left) = (None, 0.0);
+        for k in (first..first + n).map(|k| k % n) {
+            match rest_of[k] {
+                Some(rest) => (last, left) = (Some(rest), 1.0),
+                None => {
+                    let path = self.there[k].abs() + self.back[k].abs();
+                    left *= left_behind(path, stiffness_per_rad);
+                }
+            }
+            if let Some(rest) = last {
+                out[rest][k] = left;
+            }
+        }
+        out
     }
 
     /// z + T dz/dt of bristles whose deflection along the way is z: their friction relative to F.
@@ -281,4 +321,52 @@ fn moves_alike(scene: &Scene, j: usize) -> bool {
     let ends = |(least, most): (f64, f64), kick: &f64| (least.min(*kick), most.max(*kick));
     let (least, most) = scene.kick_rad_s(j).iter().fold((f64::INFINITY, 0.0), ends);
     scene.coulomb_nm[j] > 0.0 && least > LEAST_MOBILITY * most
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A joint that sets off from two rests, reverses and rests again. Bristles that held z₀ at a rest go from there as
+    /// bristles that held nothing do, plus z₀ times what is left of it, until the next rest.
+    #[test]
+    fn what_a_rest_held_adds_to_what_free_bristles_do() {
+        const STIFFNESS_PER_RAD: f64 = 100.0;
+        let there = vec![0.0, 0.0, 3e-3, 5e-3, -2e-3, -6e-3, 0.0, 0.0, -1e-3, -4e-3, 2e-3, 0.0];
+        let back = vec![0.0, 0.0, 0.0, -1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 2e-3, 0.0, 0.0];
+        let n = there.len();
+        let rest_of: Vec<Option<usize>> = (0..n)
+            .map(|k| match k {
+                0 | 1 | 11 => Some(0),
+                6 | 7 => Some(1),
+                _ => None,
+            })
+            .collect();
+        let held = [0.6, -0.3];
+        let legs: Vec<[f64; 2]> = there.iter().zip(&back).map(|(t, b)| [*t, *b]).collect();
+        let way = Way {
+            there,
+            back,
+            qd_rad_s: vec![0.0; n],
+            mean_rad_s: vec![0.0; n],
+            first: 1.0,
+            is_periodic: true,
+        };
+        let free = way.deflection_but(STIFFNESS_PER_RAD, None, &rest_of);
+        let left = way.held(STIFFNESS_PER_RAD, &rest_of, held.len());
+        let mut z = held[0];
+        for k in 0..n {
+            match rest_of[k] {
+                Some(rest) => z = held[rest],
+                None => {
+                    for leg in legs[k].into_iter().filter(|leg| *leg != 0.0) {
+                        let limit = leg.signum();
+                        z = limit + (z - limit) * (-STIFFNESS_PER_RAD * leg.abs()).exp();
+                    }
+                }
+            }
+            let sum = free[k] + held[0] * left[0][k] + held[1] * left[1][k];
+            assert!((z - sum).abs() < 1e-14, "{k}: {z} {sum}");
+        }
+    }
 }

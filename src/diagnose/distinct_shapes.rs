@@ -14,7 +14,7 @@ const MOST_Z: f64 = 6.0;
 /// is at most (θ/π) exp(−z²/2), twice the expected number of up-crossings on the way from one to the other (Efron 1997,
 /// the length heuristic); it is also at most that of one test, 2 Φ(−z) ≈ √(2/π) exp(−z²/2)/z. Each shape joins its
 /// nearest neighbour among the earlier ones (Worsley 1982): the shape before it in its own variant, and all shapes of
-/// the variant before. In families with several coefficients every shape counts as one test.
+/// the variant before. In variants with several coefficients every shape counts as one test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DistinctShapes {
     /// Number for all shapes, with any coefficients.
@@ -27,17 +27,23 @@ pub struct DistinctShapes {
 impl DistinctShapes {
     /// Counts the shapes of `entries`; `is_possible` says whether a coefficient is possible for an entry.
     pub fn of(entries: &[Entry], is_possible: impl Fn(&Entry, f64) -> bool) -> Self {
-        if entries.iter().any(|e| e.images.len() > 1) {
-            let all = entries.len() as f64;
-            return Self { all, within_reach: all };
+        let variants = entries.chunk_by(|a, b| a.shape.variant == b.shape.variant);
+        let (single, several): (Vec<_>, Vec<_>) =
+            variants.partition(|variant| variant.iter().all(|e| e.images.len() == 1));
+        let several = several.into_iter().map(|variant| variant.len() as f64).sum::<f64>();
+        let single: Vec<&Entry> = single.into_iter().flatten().collect();
+        if single.is_empty() {
+            return Self { all: several, within_reach: several };
         }
         let is_within = |e: &&Entry| {
             let sigma = 1.0 / e.images[0].square().sqrt();
             [-MOST_Z, -TYPICAL_Z, TYPICAL_Z, MOST_Z].iter().any(|z| is_possible(e, z * sigma))
         };
-        let all: Vec<&Entry> = entries.iter().collect();
-        let within_reach: Vec<&Entry> = entries.iter().filter(is_within).collect();
-        Self { all: tests(&all, TYPICAL_Z), within_reach: tests(&within_reach, TYPICAL_Z) }
+        let within_reach: Vec<&Entry> = single.iter().copied().filter(is_within).collect();
+        Self {
+            all: several + tests(&single, TYPICAL_Z),
+            within_reach: several + tests(&within_reach, TYPICAL_Z),
+        }
     }
 }
 
@@ -113,6 +119,15 @@ mod tests {
         let tests = |entries: &[Entry]| DistinctShapes::of(entries, agrees);
         assert_eq!(tests(&entries).within_reach, 2.0);
         assert_eq!(tests(&entries[1..3]), DistinctShapes { all: 2.0, within_reach: 1.0 });
+        // A variant with two columns counts beside those with one.
+        let mut mixed = entries.clone();
+        let mut other = entry(1, 1.0, &[0.0, 1.0, 0.0]);
+        other.images = [&*other.images, &*other.images].concat().into();
+        mixed.push(other);
+        assert_eq!(
+            tests(&mixed),
+            DistinctShapes { all: tests(&entries).all + 1.0, within_reach: 3.0 }
+        );
         // One coefficient of two columns does not tell where the other one is.
         let mut both = entries;
         both.iter_mut().for_each(|e| e.images = [&*e.images, &*e.images].concat().into());

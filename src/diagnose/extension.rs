@@ -188,11 +188,16 @@ impl Extension {
         scene
     }
 
-    /// The same model for another log, with shapes as [`Candidate::elsewhere`] gives them.
+    /// The same model for another log, with shapes as [`Candidate::elsewhere`] gives them, and without the coefficients
+    /// that hold along the motion of its own log alone ([`Candidate::carried`]).
     pub fn elsewhere(&self, families: &[Box<dyn Candidate>]) -> Self {
         let mut out = self.clone();
         for effect in out.effects.iter_mut().chain(&mut out.told) {
-            effect.shape = families[effect.family].elsewhere(effect.shape, &effect.coefficients);
+            let family = &families[effect.family];
+            effect.shape = family.elsewhere(effect.shape, &effect.coefficients);
+            // Their number stays, by which the unknowns of several logs are laid out.
+            let own = effect.coefficients.iter_mut().skip(family.carried(effect.shape));
+            own.for_each(|b| *b = 0.0);
         }
         out
     }
@@ -336,6 +341,38 @@ impl Effect {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::candidates::all;
+    use crate::diagnose::candidates::presliding::HELD;
+
+    /// Friction that was held at the rests of one log says nothing of the rests of another one; the stiffness and the
+    /// sliding friction of bristles do.
+    #[test]
+    fn what_was_held_at_rest_is_not_predicted_elsewhere() {
+        let families = all();
+        let family = families.iter().position(|f| f.kind() == Kind::Presliding).unwrap();
+        let carried = |variant: usize| -> Vec<f64> {
+            let effect = Effect {
+                family,
+                site: Some(1),
+                shape: Shape { variant, value: 1000.0 },
+                coefficients: vec![8.0, 3.0, -2.0],
+                off: Vec::new(),
+                absorbed: Vec::new(),
+            };
+            let extension = Extension {
+                theta: Vec::new(),
+                answers: Answer::new(),
+                instant_s: 1e-3,
+                effects: vec![effect],
+                told: Vec::new(),
+            };
+            extension.elsewhere(&families).effects.remove(0).coefficients
+        };
+        assert_eq!(carried(HELD), [0.0; 3]);
+        // Beside bristles, the variants just before.
+        assert_eq!(carried(HELD - 1), [8.0, 0.0, 0.0]);
+        assert_eq!(carried(0), [8.0, 3.0, -2.0]);
+    }
 
     /// One direction of length l beside a column: its coefficient is l r/(l² + 1/sd²) of the part r of the residual
     /// along it, outside the column.

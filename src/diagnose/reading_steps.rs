@@ -48,13 +48,14 @@ impl ReadingSteps {
         }
     }
 
-    /// The mean step at these `readings`.
-    pub fn mean_at(&self, readings: impl ExactSizeIterator<Item = f64>) -> f64 {
+    /// The mean step at these `readings`. Where steps grow, those of more than `most` count as `most`: below a wild
+    /// reading, which may be far from all others, they seem to be huge.
+    pub fn mean_at(&self, readings: impl ExactSizeIterator<Item = f64>, most: f64) -> f64 {
         let count = readings.len() as f64;
         if self.by_size.is_empty() || count == 0.0 {
             return self.least;
         }
-        readings.map(|reading| self.at(reading)).sum::<f64>() / count
+        readings.map(|reading| self.at(reading).min(most)).sum::<f64>() / count
     }
 }
 
@@ -110,8 +111,19 @@ mod tests {
             // Readings of a few rad are rounded in binary to 4e-16 rad.
             assert!((steps.at(reading) - step).abs() < 1e-14, "{reading}: {}", steps.at(reading));
         }
-        let mean = steps.mean_at([0.5, 1.5].into_iter());
+        let mean = steps.mean_at([0.5, 1.5].into_iter(), 1.0);
         assert!((mean - 5.5e-4).abs() < 1e-14, "{mean}");
+    }
+
+    /// Between the largest readings, of 3 rad, and a wild one is a step of 997 rad.
+    #[test]
+    fn a_wild_reading_makes_no_coarse_steps() {
+        let mut wild = wave(|size| 10f64.powf(size.log10().floor() - 3.0));
+        wild[7] = 1000.0;
+        let steps = ReadingSteps::of(&wild, 1e-6);
+        assert!(steps.at(2.9999) > 900.0, "{}", steps.at(2.9999));
+        let mean = steps.mean_at([0.5, 2.9999].into_iter(), 0.01);
+        assert!((mean - 0.5 * (1e-4 + 0.01)).abs() < 1e-14, "{mean}");
     }
 
     #[test]
@@ -120,7 +132,7 @@ mod tests {
         let steps = ReadingSteps::of(&even, 1e-6);
         let step = resolution(&even);
         assert_eq!([0.0, 0.01, 1.0, 2.9, 5.0].map(|reading| steps.at(reading)), [step; 5]);
-        assert_eq!(steps.mean_at([0.5, 1.5].into_iter()), step);
+        assert_eq!(steps.mean_at([0.5, 1.5].into_iter(), 1.0), step);
         // Readings without steps lie closer in some places than in others.
         let fine = ReadingSteps::of(&wave(|_| 1e-15), 1e-3);
         assert!(fine.by_size.is_empty());

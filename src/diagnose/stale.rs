@@ -219,7 +219,8 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
         hanging.clear();
     }
     let share = |rows: &[usize]| rows.len() as f64 / changing.len().max(1) as f64;
-    let step = steps.mean_at(changing.iter().map(|k| y[*k]));
+    // Chance makes no more than every reading repeat.
+    let step = steps.mean_at(changing.iter().map(|k| y[*k]), change);
     let by_steps = if change > 0.0 { step / change } else { 1.0 };
     // Noise comes back to the reading before the last one as often as it stays. (Velocities that are slopes of rounded
     // angles have coarse steps that no smallest difference shows, because times are rounded as well.)

@@ -2,8 +2,8 @@
 //!
 //! Friction falls while an arm warms up, and its change between the periods would count as noise: it would widen σ, and
 //! hide what the model lacks behind a scatter that is none. Friction that drifts as [`FrictionDrift`] describes is
-//! tested joint by joint. On rows whitened as for the estimate ([`noise_of_rows`]), with d the deviations from the mean
-//! of P periods, the four columns explain E of ‖d‖², and
+//! tested joint by joint. On rows whitened as for the estimate ([`noise_of_rows`]), but without those of the periods'
+//! means, with d the deviations from the mean of P periods, the four columns explain E of ‖d‖², and
 //!
 //! F = (E/4)/((‖d‖² − E)/ν), ν = rows (P − 1) − 4
 //!
@@ -228,11 +228,17 @@ struct Test {
 impl Test {
     /// Tests the `n` rows of every period in `panel`, whose columns are those of the first period and have the factor
     /// `growth` in each. `None` for a joint that stands still or whose torque does not scatter.
+    ///
+    /// The first row, the mean of a period, is left out. Where the zero of a torque creeps, the means differ far more than
+    /// the rows beside them, from which their noise is taken, and even friction that is nearly the same in both directions
+    /// has a small mean: a zero that crept by one σ of single samples along eight periods was told as friction of joint 6
+    /// of a UR5 (p = 5e-9, and 0.3 without that row), whose sign has a mean of 0.014. Of friction that drifts, the means
+    /// tell hardly anything: F was 401 with them, and 399 without.
     fn of(panel: &Panel, n: usize, growth: &[SVector<f64, COLUMNS>]) -> Option<Self> {
         let mut deviations = panel.y.clone();
         subtract_mean_period(&mut deviations, n);
         let variances = noise_of_rows(&deviations, n);
-        let used: Vec<usize> = (0..n).filter(|k| variances[*k] > 0.0).collect();
+        let used: Vec<usize> = (1..n).filter(|k| variances[*k] > 0.0).collect();
         let column = |k: usize| SVector::<f64, COLUMNS>::from_fn(|c, _| panel.x[c * n + k]);
         let mut overlap = SMatrix::<f64, COLUMNS, COLUMNS>::zeros();
         for k in &used {
@@ -417,6 +423,21 @@ mod tests {
             let found = TakenOut::of(&mut problem, &velocities(), &mut Spectrum::default());
             assert!(found.is_empty(), "seed {seed}");
             assert_eq!(torque(&problem), before);
+        }
+    }
+
+    /// The zero of both torques creeps by five times the noise. Told by the means of the periods as well, that was
+    /// friction, with a probability below 1e-22 in each of these.
+    #[test]
+    fn a_zero_that_creeps_is_no_friction() {
+        for seed in 0..4 {
+            let mut problem = problem(seed, 0.0);
+            for panel in &mut problem.panels {
+                let samples = panel.y.len() as f64;
+                panel.y.iter_mut().enumerate().for_each(|(k, y)| *y += 5.0 * k as f64 / samples);
+            }
+            let found = TakenOut::of(&mut problem, &velocities(), &mut Spectrum::default());
+            assert!(found.is_empty(), "seed {seed}");
         }
     }
 

@@ -31,10 +31,10 @@ const WIDTH_ROWS: usize = 50;
 ///    3.6·10⁵, acceleration 3·10⁴ rad/s², current 500 A, torque 5·10⁴ Nm, temperature 1000 °C, time 10¹⁹ s.
 /// 2. Time stamps rounded more coarsely than half the sampling interval are replaced by the straight line through them,
 ///    if the motion shows that the rows were sampled evenly, and so are stamps that scatter; beside these, the motion
-///    shows where rows were lost and where the clock was set. Among stamps that do not scatter, rows that were held back
-///    and written in one burst are spread evenly between the row before and the row after, unless the motion shows that
-///    they were really sampled that late. Then times must increase: repeated and backward times are set aside, and so
-///    are up to 8 consecutive rows whose time is far ahead.
+///    shows where rows were lost and where the clock was set. Among stamps that do not scatter otherwise, rows that were
+///    held back and written in one burst are spread evenly between the row before and the row after, unless the motion
+///    shows that they were really sampled that late. Then times must increase: repeated and backward times are set
+///    aside, and so are up to 8 consecutive rows whose time is far ahead.
 /// 3. Units are checked: Δq is compared with ∫q̇ dt, and the clock with the steps a recorder can have. Numbers that
 ///    indicate degrees, milli-, micro- or nanoseconds are an error that names the change to make in the layout. So are,
 ///    in a log without velocities, angles that move faster than 30 rad/s.

@@ -328,11 +328,15 @@ fn restamped(motion: &clean::Motion) -> Option<(Vec<f64>, Vec<LogWarning>)> {
     if let Some(on_a_line) = arrival_stamps(motion) {
         return Some(with_one(on_a_line));
     }
-    match scatter_is_common(motion) {
-        // Among stamps that scatter, late rows and tiny steps are everywhere, and say nothing about bursts.
-        true => stamp_pieces(motion),
-        false => late_bursts(motion).map(with_one),
+    if !scatter_is_common(motion) {
+        return late_bursts(motion).map(with_one);
     }
+    // Among stamps that scatter, late rows and tiny steps are everywhere, and say nothing about bursts, unless bursts are
+    // all that scatters. Of an arm that rests for most of the log, no motion tells the line.
+    let leave_no_scatter = |(time_s, _): &(Vec<f64>, LogWarning)| {
+        !scatter_is_common(&clean::Motion { time_s, ..*motion })
+    };
+    stamp_pieces(motion).or_else(|| late_bursts(motion).filter(leave_no_scatter).map(with_one))
 }
 
 /// Positions of time, angles and velocities among the columns of a [`Table`]. Without recorded velocities, the velocity

@@ -29,8 +29,9 @@ impl Tears {
     ///
     /// A row is torn off if a joint is farther from the row before than it goes, at the larger of its speeds beside it,
     /// in this step, a quarter of a second and the time for which its reading hung before. The speeds are slopes of the
-    /// angles; recorded velocities may be late, or none. A row that is wild by itself is no tear, because it makes the
-    /// speeds beside it large. A step that is too long to be interpolated is a gap already.
+    /// angles; recorded velocities may be late, or none. Where readings hang again and again, because the recorder is
+    /// faster than the sensor, they are slopes from one new reading to the next. A row that is wild by itself is no tear,
+    /// because it makes the speeds beside it large. A step that is too long to be interpolated is a gap already.
     pub fn of(time_s: &[f64], joints: &[impl AsRef<[f64]>]) -> Self {
         let samples = time_s.len();
         let longest_s = median_step(time_s).map_or(0.0, |step_s| bridged_gap_s(1.0 / step_s));
@@ -42,7 +43,10 @@ impl Tears {
         let mut rows: Vec<usize> = inner.filter(is_torn).collect();
         // Joints that jump one row after the other are torn once: a run has rows whose slopes it shows.
         rows.dedup_by(|row, before| *row <= *before + BESIDE);
-        Self { rows, samples }
+        Self {
+            rows: without_glitches(rows, |first, last| comes_back(time_s, joints, first, last)),
+            samples,
+        }
     }
 
     /// Number of tears.
@@ -72,6 +76,36 @@ impl Tears {
     }
 }
 
+/// The torn `rows` without those of readings that are off for a moment: the recording is the same before and behind.
+fn without_glitches(rows: Vec<usize>, comes_back: impl Fn(usize, usize) -> bool) -> Vec<usize> {
+    let mut kept: Vec<usize> = Vec::with_capacity(rows.len());
+    let mut is_open = false;
+    for row in rows {
+        match kept.last() {
+            Some(&last) if is_open && comes_back(last, row) => {
+                kept.pop();
+                is_open = false;
+            }
+            _ => {
+                kept.push(row);
+                is_open = true;
+            }
+        }
+    }
+    kept
+}
+
+/// Whether the motion goes on in row `last`, within a quarter of a second, from where it was before row `first`.
+fn comes_back(time_s: &[f64], joints: &[impl AsRef<[f64]>], first: usize, last: usize) -> bool {
+    let passed_s = time_s[last] - time_s[first - 1];
+    let goes_on = |q: &[f64]| {
+        let speed_rad_s = |k: usize| (q[k] - q[k - 1]).abs() / (time_s[k] - time_s[k - 1]);
+        let fastest_rad_s = speed_rad_s(first - 1).max(speed_rad_s(last + 1));
+        (q[last] - q[first - 1]).abs() <= TORN_RAD + fastest_rad_s * passed_s
+    };
+    passed_s <= LOST_S && joints.iter().all(|q| goes_on(q.as_ref()))
+}
+
 /// Whether the angle `q` jumps from row `k` − 1 to row `k`.
 fn is_torn(time_s: &[f64], q: &[f64], k: usize) -> bool {
     let way_rad = |k: usize| (q[k] - q[k - 1]).abs();
@@ -80,12 +114,41 @@ fn is_torn(time_s: &[f64], q: &[f64], k: usize) -> bool {
     }
     let step_s = |k: usize| time_s[k] - time_s[k - 1];
     let beside = (k - BESIDE..k).chain(k + 1..=k + BESIDE);
-    let speed_rad_s = beside.map(|k| way_rad(k) / step_s(k)).fold(0.0, f64::max);
+    let from_row_to_row = beside.map(|k| way_rad(k) / step_s(k));
+    let new_readings = [new_readings_before(q, k), new_readings_from(q, k)].into_iter().flatten();
+    let between_readings = new_readings.map(|rows| slower_rad_s(time_s, q, rows));
+    let speed_rad_s = from_row_to_row.chain(between_readings).fold(0.0, f64::max);
     // From rest to rest, an acceleration a carries a joint by a Δt²/4.
     let accelerated_rad = ACCELERATION_RAD_S2 * step_s(k).powi(2) / 4.0;
-    let hung_since = (0..k - 1).rev().take_while(|i| q[*i] == q[k - 1]).last().unwrap_or(k - 1);
-    let unseen_s = time_s[k] - time_s[hung_since] + LOST_S;
+    let unseen_s = time_s[k] - time_s[hung_since(q, k - 1)] + LOST_S;
     way_rad(k) > TORN_RAD + accelerated_rad + speed_rad_s * unseen_s
+}
+
+/// The first of the rows up to `k` that all have the reading of row `k`.
+fn hung_since(q: &[f64], k: usize) -> usize {
+    (0..k).rev().take_while(|i| q[*i] == q[k]).last().unwrap_or(k)
+}
+
+/// The rows of the last three new readings in front of row `k`.
+fn new_readings_before(q: &[f64], k: usize) -> Option<[usize; 3]> {
+    let before = |k: usize| Some(hung_since(q, k.checked_sub(1)?));
+    let last = before(k)?;
+    let middle = before(last)?;
+    Some([before(middle)?, middle, last])
+}
+
+/// The row `k` and those of the next two new readings.
+fn new_readings_from(q: &[f64], k: usize) -> Option<[usize; 3]> {
+    let behind = |k: usize| (k + 1..q.len()).find(|i| q[*i] != q[k]);
+    let middle = behind(k)?;
+    Some([k, middle, behind(middle)?])
+}
+
+/// The slower of the speeds between three new readings, in these `rows`, rad/s: of a joint at rest that was torn once
+/// already, one of the two is hardly any.
+fn slower_rad_s(time_s: &[f64], q: &[f64], [first, middle, last]: [usize; 3]) -> f64 {
+    let speed_rad_s = |i: usize, k: usize| (q[k] - q[i]).abs() / (time_s[k] - time_s[i]);
+    speed_rad_s(first, middle).min(speed_rad_s(middle, last))
 }
 
 #[cfg(test)]
@@ -120,6 +183,10 @@ mod tests {
         let (time_s, mut joints) = log(0.1);
         joints[0][151..].iter_mut().for_each(|q| *q += 3.0);
         assert_eq!(found(&time_s, &joints), [150]);
+        // A joint at rest that jumps twice.
+        let (time_s, mut joints) = log(0.5);
+        joints[1][300..].iter_mut().for_each(|q| *q -= 0.5);
+        assert_eq!(found(&time_s, &joints), [150, 300]);
         let (time_s, joints) = log(0.0);
         let whole = Tears::of(&time_s, &joints);
         assert_eq!((whole.count(), whole.longest_run(), whole.run_of(7)), (0, 0..400, 0..400));
@@ -143,6 +210,14 @@ mod tests {
         let mut hung = joints.clone();
         hung[0][150..200].fill(joints[0][149]);
         assert!(found(&time_s, &hung).is_empty());
+        // A sensor that has a new reading for every sixth row, up to 0.1 rad from the one before.
+        let mut slow = joints.clone();
+        slow[0] = (0..400).map(|k| joints[0][k - k % 6]).collect();
+        assert!(found(&time_s, &slow).is_empty());
+        // A joint at rest whose encoder is off for twelve rows.
+        let mut off = joints.clone();
+        off[1][150..162].iter_mut().for_each(|q| *q += 0.3);
+        assert!(found(&time_s, &off).is_empty());
         // A gap of a second, in which the joint at rest went elsewhere.
         let later = |(k, t): (usize, &f64)| if k < 150 { *t } else { t + 1.0 };
         let gap_s: Vec<f64> = time_s.iter().enumerate().map(later).collect();

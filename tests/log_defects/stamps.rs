@@ -117,6 +117,37 @@ fn stamps_of_rows_that_arrive_late_beside_lost_ones_and_a_clock_that_is_set() {
     assert!((first_s - 0.25).abs() < 1e-3, "{first_s}");
 }
 
+/// All rows are written in blocks of eight, and the arm moves in 30 of them only: these decide nothing about a line, and
+/// the blocks are bursts. Each ends 70 µs late.
+#[test]
+fn stamps_of_rows_that_are_all_written_in_bursts() {
+    let log = edited(|rows| {
+        rows.truncate(394);
+        for (k, row) in rows[1..].iter_mut().enumerate() {
+            let stamp_s = STEP_S * (k.div_ceil(8) * 8) as f64 + 1e-5 * ((k + 7) % 8) as f64;
+            row[0] = (100.0 + stamp_s).to_string();
+            let (moves_s, way_rad) = (30.0 * STEP_S, 0.1);
+            let s = ((STEP_S * k as f64 - 0.04) / moves_s).clamp(0.0, 1.0);
+            let come = s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+            let rate = 30.0 * (s * (1.0 - s)).powi(2) / moves_s;
+            for j in 0..JOINTS {
+                row[1 + j] = (angle_rad(j, 100.0) + way_rad * come).to_string();
+                row[1 + JOINTS + j] = (way_rad * rate).to_string();
+            }
+        }
+    })
+    .unwrap();
+    assert_eq!((log.samples(), log.rows.missed_samples), (393, 0), "{}", log.rows);
+    for (k, t) in log.time_s.iter().enumerate() {
+        assert!((t - 100.0 - STEP_S * k as f64).abs() < 1e-4, "{t} {k}");
+    }
+    assert!(
+        matches!(log.rows.warnings[..], [LogWarning::LateBursts { rows: 343, bursts: 49, .. }]),
+        "{}",
+        log.rows
+    );
+}
+
 /// A recorder that reads the arm every 2 to 14 ms: the stamps are right, and no row is missing.
 #[test]
 fn rows_that_are_sampled_unevenly_are_all_there() {

@@ -256,6 +256,12 @@ pub trait Candidate: Sync {
         shape
     }
 
+    /// How many of the coefficients, from the first one on, hold along another motion too; the others say what happened
+    /// along the motion of their log. All, unless the law says otherwise.
+    fn carried(&self, _shape: Shape) -> usize {
+        usize::MAX
+    }
+
     /// The shape nearest to `shape` that is consistent with the coefficients `b`, for laws whose coefficients also
     /// determine the shape. An effect that is explained only with an inconsistent shape is not quite the law's own.
     fn agreeing(&self, shape: Shape, _b: &[f64]) -> Shape {

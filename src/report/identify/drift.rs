@@ -84,9 +84,10 @@ pub(super) fn means_in_words(training: &Training) -> Option<String> {
     joints.sort_unstable();
     joints.dedup();
     let names: Vec<String> = joints.iter().map(usize::to_string).collect();
+    let of = if names.len() == 1 { "joint" } else { "joints" };
     (!names.is_empty()).then(|| {
         format!(
-            "The friction of joint {} drifts: its parameters and their intervals mean the friction that it had on average along the \
+            "Friction of {of} {} drifts: its parameters and their intervals mean the friction that there was on average along the \
              log, not that of a cold or of a warm arm.",
             names.join(", ")
         )
