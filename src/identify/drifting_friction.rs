@@ -28,7 +28,7 @@ use super::whiten::{ROWS_END, Spectrum, noise_of_rows};
 use crate::base::BaseSet;
 use crate::dynamics::Parameter;
 use crate::robot::JointSignals;
-use crate::signal::{Replicates, mean_period, subtract_mean_period};
+use crate::signal::{Replicates, mean_period, rms, subtract_mean_period};
 
 /// Friction of one joint that drifts along a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -299,11 +299,6 @@ fn make_up(y: &mut [f64], kept: &[f64], forward: &Forward, inverse: &Inverse) {
         let _ = inverse.process(&mut spectrum, period);
         period.iter_mut().zip(&mean).for_each(|(y, mean)| *y += mean);
     }
-}
-
-/// Root mean square.
-fn rms(y: &[f64]) -> f64 {
-    (y.iter().map(|y| y * y).sum::<f64>() / y.len() as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -91,7 +91,8 @@ impl Activity {
     }
 }
 
-fn rms(y: &[f64]) -> f64 {
+/// Root mean square.
+pub fn rms(y: &[f64]) -> f64 {
     (y.iter().map(|v| v * v).sum::<f64>() / y.len() as f64).sqrt()
 }
 

@@ -47,7 +47,7 @@ mod slip;
 mod spectra;
 mod tears;
 
-pub use activity::Activity;
+pub use activity::{Activity, rms};
 pub use averaged_motion::{AveragedMotion, HarmonicPower};
 pub use butterworth::{HIGHEST_ORDER, Scratch, ZeroPhase};
 pub use decimate::Decimator;
