@@ -32,6 +32,7 @@ mod drifting_friction;
 mod dynamics_identities;
 mod effect_size;
 mod excite_design;
+mod held_at_rest;
 mod impossible_inertia;
 mod late_bursts;
 mod log_defects;

@@ -10,6 +10,7 @@ use super::explanation::Explanation;
 use super::extended::Extended;
 use super::finding::Finding;
 use super::form_error::{OnJoint, error_of_form};
+use super::held::add_held;
 use super::held_out::{Models, Validation, held_out_gain};
 use super::image::{Image, Span};
 use super::intervals;
@@ -83,8 +84,14 @@ impl<'a> Diagnoser<'a> {
         let log = Cleaned::of(m, &self.options)?;
         let m = &log.measurement(m.source);
         let mut regression = log.regression(&mut self.identifier, m.source)?;
-        let identification = self.identifier.identify_regression(&regression)?;
+        let mut identification = self.identifier.identify_regression(&regression)?;
         self.refuse_misread(&regression, m.source)?;
+        let held = self.sticking(&regression, &identification, (&log, m.source))?;
+        let is_more = held.len() > identification.held_at_rest.len();
+        regression.prepared.held_at_rest = held;
+        if is_more {
+            identification = self.identifier.identify_regression(&regression)?;
+        }
         let measured_nm = measured_nm(&regression);
         let coarse =
             move_to_common_motion(&mut regression, (self.arm, self.set), &identification.fit.theta);
@@ -102,18 +109,22 @@ impl<'a> Diagnoser<'a> {
         if let Some(simulation) = simulation {
             self.compare(study, simulation, &mut model);
         }
-        let Extended { causes, extension, after_nm, accepted, rest, .. } = model;
+        let Extended { mut causes, extension, mut after_nm, accepted, rest, .. } = model;
         let faults = [log.faults.clone(), touches].concat();
-        let mut causes = in_order(faults, causes, study.scene.periodic);
-        let tears = take_out_tears(&mut causes, m);
-        make_modest(&mut causes, simulation.is_some());
-
-        // What is left, and how sure the causes are beside it.
         let rms = |e: &JointSignals| -> Vec<f64> {
             let of = |j: usize| rms_where(e.joint(j), |k| study.whitening.counts(j, k));
             (0..e.joints()).map(of).collect()
         };
         let before_nm = residual(study, null);
+        let noise_of_mean_nm = noise_of_mean(&regression).as_ref().map(rms);
+        let noise_nm = noise_of_mean_nm.as_deref();
+        let with_model = (&extension, &mut after_nm);
+        add_held((study, self.set), with_model, (&before_nm, noise_nm), &mut causes);
+        let mut causes = in_order(faults, causes, study.scene.periodic);
+        let tears = take_out_tears(&mut causes, m);
+        make_modest(&mut causes, simulation.is_some());
+
+        // What is left, and how sure the causes are beside it.
         let [before_rms_nm, after_rms_nm] = [&before_nm, &after_nm].map(rms);
         let lack = misfit::lack_of_fit(study, &accepted, &rest);
         let form = error_of_form(&laws, &causes, study.scene.joints());
@@ -157,7 +168,7 @@ impl<'a> Diagnoser<'a> {
         let mut diagnosis = Diagnosis {
             log: m.source.to_owned(),
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
-            noise_of_mean_nm: noise_of_mean(&regression).as_ref().map(rms),
+            noise_of_mean_nm,
             before: Rms { rms_nm: before_rms_nm },
             verdict: Verdict::of(&causes, unexplained.is_some()),
             causes,

@@ -13,6 +13,7 @@ use super::scene::{OtherFriction, SHARPEST, Scene, Turn};
 use super::study::{Entry, Study};
 use super::whitening::Whitening;
 use crate::base::BaseSet;
+use crate::dynamics::Parameter;
 use crate::identify::{Prepared, Problem};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::mean_period;
@@ -199,6 +200,24 @@ impl Extension {
             let own = effect.coefficients.iter_mut().skip(family.carried(effect.shape));
             own.for_each(|b| *b = 0.0);
         }
+        out
+    }
+
+    /// The same model with no friction on joint `j`.
+    pub fn without_friction_of(
+        &self,
+        j: usize,
+        set: &BaseSet,
+        families: &[Box<dyn Candidate>],
+    ) -> Self {
+        let mut out = self.clone();
+        for parameter in [Parameter::Coulomb(j), Parameter::Viscous(j)] {
+            set.index_of(parameter).into_iter().for_each(|k| out.theta[k] = 0.0);
+        }
+        out.answers.retain(|(joint, ..)| *joint != j);
+        let acts = |effect: &Effect| effect.site.is_none_or(|own| own == j);
+        out.effects
+            .retain(|effect| !(acts(effect) && families[effect.family].kind().is_friction()));
         out
     }
 

@@ -46,6 +46,7 @@ mod extension;
 mod finding;
 mod form_error;
 mod gain;
+mod held;
 mod held_out;
 mod image;
 mod intervals;

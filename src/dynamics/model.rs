@@ -57,6 +57,11 @@ impl Model {
         self.bodies.len()
     }
 
+    /// ε of the regularised sign, rad/s.
+    pub fn friction_epsilon_rad_s(&self) -> f64 {
+        1.0 / self.inverse_epsilon
+    }
+
     /// The regularised sign tanh(q̇/ε) of the paper's (3).
     #[inline(always)]
     pub fn friction_sign<T: Real>(&self, qd_rad_s: T) -> T {

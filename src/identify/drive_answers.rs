@@ -11,6 +11,7 @@
 //! information about the arm; if they are left out, an arm without feed-forward gets inertias that are wrong by more
 //! than σ.
 
+use super::held_at_rest::HeldAtRest;
 use super::problem::Problem;
 use crate::dynamics::{Model, Motion};
 use crate::signal::{FineClock, HarmonicPower};
@@ -47,20 +48,24 @@ pub fn drive_answers(
 /// Projects the responses of all drives out of `problem`, which is a repeating motion with its periods of torque. X
 /// and y keep their components orthogonal to the responses, joint by joint, as in a fit that includes these columns
 /// (Frisch and Waugh 1933). With equal weights the solution is that of such a fit; rows that are weighted afterwards
-/// have another solution, which is just as free of the responses.
+/// have another solution, which is just as free of the responses. Rows that are left out because friction is `held`
+/// there stay out of it.
 pub fn without_drive_answers(
     problem: &mut Problem,
     clock: &FineClock,
     model: &Model,
     motion: &Motion,
     acceleration: &[HarmonicPower],
+    held: &[HeldAtRest],
 ) {
     let n = problem.samples;
     for (j, (panel, known)) in problem.panels.iter_mut().zip(acceleration).enumerate() {
         let qd = clock.refined(motion.qd_rad_s.joint(j));
         let sign: Vec<f64> = qd.iter().map(|qd| model.friction_sign(*qd)).collect();
         let mut directions: Vec<Vec<f64>> = Vec::new();
+        let own = held.iter().find(|held| held.joint == j);
         for mut column in drive_answers(clock, &sign, known.estimate.len(), problem.rate_hz) {
+            own.into_iter().for_each(|held| held.silence(&mut column));
             directions.iter().for_each(|d| take_out(d, &mut column));
             let length = column.iter().map(|x| x * x).sum::<f64>().sqrt();
             // A joint that stands still has no reversals.

@@ -3,6 +3,7 @@
 use super::covariance::{Covariance, CovarianceError, CovarianceKind};
 use super::error::IdentifyError;
 use super::fit::{Estimator, Fit, FitError, Fitter, Weighting};
+use super::held_at_rest::HeldAtRest;
 use super::lack_of_fit::{Floor, LackOfFit};
 use super::options::Options;
 use super::problem::Problem;
@@ -54,6 +55,14 @@ impl Estimate {
             covariance.matrix /= kept;
         }
         self.lack_of_fit = self.lack_of_fit.map(|lack| lack.scaled(kept));
+        self
+    }
+
+    /// Corrects the test for rows that were left out of the problem of `joints` joints because friction is `held` there:
+    /// they contain nothing that the model could lack.
+    pub(super) fn without_pauses(mut self, held: &[HeldAtRest], joints: usize) -> Self {
+        let left_out = held.iter().map(|held| held.share).sum::<f64>() / joints as f64;
+        self.lack_of_fit = self.lack_of_fit.map(|lack| lack.scaled(1.0 / (1.0 - left_out)));
         self
     }
 }

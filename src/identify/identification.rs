@@ -3,6 +3,7 @@
 use super::covariance::Covariance;
 use super::drifting_friction::DriftingFriction;
 use super::fit::{Estimator, Fit};
+use super::held_at_rest::HeldAtRest;
 use super::lack_of_fit::LackOfFit;
 use super::pooled::Agreement;
 use super::prepared::Processing;
@@ -36,6 +37,11 @@ pub struct Identification {
     /// know only the noise beside it; the residual contains it. Not looked for in a motion that repeats less than
     /// [`MANY_PERIODS`](super::MANY_PERIODS) times.
     pub drifting_friction: Vec<DriftingFriction>,
+    /// Friction that joints hold in their pauses. These rows are left out of estimate, covariance and tests; the residual
+    /// contains them.
+    pub held_at_rest: Vec<HeldAtRest>,
+    /// Friction that joints may hold in their pauses, unless it is something else that the model lacks. These rows count.
+    pub may_be_held: Vec<HeldAtRest>,
     /// What the user should know about how the log was used.
     pub warnings: Vec<String>,
 }
@@ -63,22 +69,26 @@ impl Identification {
 /// Rms per joint of the repeating torque that is not explained, Nm. `residual_squares` are ‖e_j‖² over all periods,
 /// left by a fit of `parameters` parameters. From them the scatter between periods is subtracted, and from the mean
 /// period the share of its noise σ²/P that the fit leaves. Filled-in rows lower P and the scatter to the parts that
-/// are `kept` ([`Prepared::kept`](super::Prepared::kept)).
+/// are `kept` ([`Prepared::kept`](super::Prepared::kept)). Rows in which friction is `held` are not among those of the
+/// residual, but their share of the scatter is ([`HeldAtRest::leave_out`]).
 pub(super) fn explainable(
     residual_squares: &[f64],
     parameters: usize,
     replicates: &Replicates,
     kept: [f64; 2],
+    held: &[HeldAtRest],
 ) -> Vec<f64> {
     let n = replicates.mean.samples() as f64;
     let periods = replicates.periods as f64;
     let joints = replicates.sigma.len() as f64;
-    let fitted = parameters as f64 / (joints * n);
-    let pairs = residual_squares.iter().zip(&replicates.sigma);
+    let pairs = residual_squares.iter().zip(&replicates.sigma).enumerate();
     pairs
-        .map(|(squares, sigma)| {
+        .map(|(j, (squares, sigma))| {
             let variance = sigma * sigma;
-            let of_mean = (squares - kept[1] * variance * n * (periods - 1.0)) / (n * periods);
+            let left_out = held.iter().find(|held| held.joint == j).map_or(0.0, |held| held.share);
+            let used = n * (1.0 - left_out);
+            let fitted = parameters as f64 / (joints * used);
+            let of_mean = (squares - kept[1] * variance * n * (periods - 1.0)) / (used * periods);
             (of_mean - variance / (kept[0] * periods) * (1.0 - fitted)).max(0.0).sqrt()
         })
         .collect()
@@ -118,7 +128,7 @@ mod tests {
         let mut replicates = replicate_noise(&signals, N).unwrap();
         replicates.sigma[0] /= kept[1].sqrt();
         let squares = y.iter().map(|y| y * y).sum::<f64>();
-        let found = explainable(&[squares], 0, &replicates, kept)[0];
+        let found = explainable(&[squares], 0, &replicates, kept, &[])[0];
         assert!((0.257..0.338).contains(&found), "{found}");
     }
 }

@@ -6,6 +6,7 @@ use super::drive_answers::without_drive_answers;
 use super::error::IdentifyError;
 use super::estimation::{Estimate, Estimation, MotionAids};
 use super::fit::Estimator;
+use super::held_at_rest::HeldAtRest;
 use super::identification::{Identification, explainable};
 use super::lowered::Lowered;
 use super::measurement::Measurement;
@@ -324,7 +325,8 @@ impl<'a> Identifier<'a> {
             }
         };
         let drifts = self.take_out_drift(&mut prepared);
-        self.take_out_drive_answers(&prepared);
+        let (held, may_be_held) = self.held_at_rest(&prepared);
+        let whole = self.only_moving(&prepared, &held);
         let aids = MotionAids { acceleration: prepared.acceleration.as_deref(), instruments };
         let estimate = self.estimation.estimate(
             &self.problem,
@@ -334,15 +336,19 @@ impl<'a> Identifier<'a> {
             aids,
             &self.options,
         )?;
-        let estimate = self.with_motion_noise(estimate, &prepared)?.of_fewer_rows(prepared.kept());
+        let estimate = self
+            .with_motion_noise(estimate, &prepared, (whole.as_ref(), &held))?
+            .of_fewer_rows(prepared.kept());
         let Estimate { mut fit, mut covariances, lack_of_fit } = estimate;
         let covariance = covariances.swap_remove(0).map_err(without)?;
-        let explainable_nm = prepared
-            .replicates
-            .as_ref()
-            .map(|r| explainable(&fit.residual_squares, fit.theta.len(), r, prepared.kept()));
-        if !drifts.is_empty() {
-            // The drift is a part of the torque that the model leaves, though neither noise nor the same every time.
+        let explainable_nm = prepared.replicates.as_ref().map(|replicates| {
+            explainable(&fit.residual_squares, fit.theta.len(), replicates, prepared.kept(), &held)
+        });
+        if let Some(whole) = whole {
+            self.problem = whole;
+        }
+        if !drifts.is_empty() || !held.is_empty() {
+            // The model leaves both, though neither is noise, and a drift is not the same every time.
             drifts.iter().for_each(|drift| drift.put_back(&mut self.problem));
             fit.state_residuals_of(&self.problem);
         }
@@ -360,6 +366,8 @@ impl<'a> Identifier<'a> {
                 .iter()
                 .map(|drift| drift.finding(self.set, &fit.theta))
                 .collect(),
+            held_at_rest: held,
+            may_be_held,
             warnings: prepared.warnings,
             fit,
         })
@@ -379,23 +387,42 @@ impl<'a> Identifier<'a> {
         drifts
     }
 
-    /// Projects the drives' responses to friction out of the problem. A single run stays as it is: its low-pass is
-    /// far slower than the response of a drive at a reversal.
-    fn take_out_drive_answers(&mut self, prepared: &Prepared) {
-        let Some(acceleration) = &prepared.acceleration else { return };
+    /// Friction that is held in the pauses of the log `prepared`, which knows it or has to be searched for it; and friction
+    /// that may be held.
+    fn held_at_rest(&mut self, prepared: &Prepared) -> (Vec<HeldAtRest>, Vec<HeldAtRest>) {
+        if prepared.replicates.is_none() || !prepared.held_at_rest.is_empty() {
+            return (prepared.held_at_rest.clone(), Vec::new());
+        }
+        let Self { clock, problem, model, set, .. } = self;
+        let (motion, epsilon_rad_s) = (&prepared.motion, model.friction_epsilon_rad_s());
+        let all =
+            HeldAtRest::of(problem, set, &motion.qd_rad_s, epsilon_rad_s, |moving, pauses| {
+                take_out_drive_answers(moving, clock, model, prepared, pauses);
+                pauses.iter().for_each(|pause| pause.leave_out(moving));
+            });
+        all.into_iter().partition(|held| held.sticks)
+    }
+
+    /// Takes the drives' responses to friction out of the problem, and the rows of the log `prepared` in which friction is
+    /// `held`. Returns the problem with these rows, if there are any.
+    fn only_moving(&mut self, prepared: &Prepared, held: &[HeldAtRest]) -> Option<Problem> {
         let Self { clock, problem, model, .. } = self;
-        clock.take_if(|clock| clock.samples() != problem.samples);
-        let clock = clock.get_or_insert_with(|| FineClock::new(problem.samples, TICKS));
-        without_drive_answers(problem, clock, model, &prepared.motion, acceleration);
+        take_out_drive_answers(problem, clock, model, prepared, held);
+        let whole = (!held.is_empty()).then(|| problem.clone());
+        held.iter().for_each(|held| held.leave_out(problem));
+        whole
     }
 
     /// Returns `estimate` of the log `prepared`. Where its model fails against the scatter of the torque, it is
-    /// tested again against the scatter of torque and motion together.
+    /// tested again against the scatter of torque and motion together. `whole` is the problem with the rows in which
+    /// friction is `held`, if there are any.
     fn with_motion_noise(
         &mut self,
         estimate: Estimate,
         prepared: &Prepared,
+        (whole, held): (Option<&Problem>, &[HeldAtRest]),
     ) -> Result<Estimate, IdentifyError> {
+        let estimate = estimate.without_pauses(held, self.problem.joints());
         if estimate.lack_of_fit.is_none_or(|lack| lack.fits()) {
             return Ok(estimate);
         }
@@ -405,9 +432,11 @@ impl<'a> Identifier<'a> {
         };
         let Self { problem, assembler, model, set, .. } = self;
         let (mean, theta) = (&prepared.motion, &estimate.fit.theta);
-        let moved = moved_to_mean(problem, assembler, model, mean, &deviations, theta);
+        let whole = whole.unwrap_or(problem);
+        let mut moved = moved_to_mean(whole, assembler, model, mean, &deviations, theta);
+        held.iter().for_each(|held| held.leave_out(&mut moved));
         let lack_of_fit = Some(self.estimation.lack_of_fit(&moved, set, acceleration)?);
-        Ok(Estimate { lack_of_fit, ..estimate })
+        Ok(Estimate { lack_of_fit, ..estimate }.without_pauses(held, moved.joints()))
     }
 
     /// Estimates from one log by several methods: estimators, each with its kinds of covariance.
@@ -420,7 +449,8 @@ impl<'a> Identifier<'a> {
         let by_instruments = methods.iter().map(|(e, _)| *e).find(|e| *e == Estimator::Iv);
         let instruments = self.instruments_for(by_instruments, &prepared)?;
         self.take_out_drift(&mut prepared);
-        self.take_out_drive_answers(&prepared);
+        let (held, _) = self.held_at_rest(&prepared);
+        let whole = self.only_moving(&prepared, &held);
         let aids = MotionAids {
             acceleration: prepared.acceleration.as_deref(),
             instruments: instruments.as_ref(),
@@ -428,10 +458,26 @@ impl<'a> Identifier<'a> {
         let estimates = methods.iter().map(|(estimator, kinds)| {
             let Self { estimation, problem, set, options, .. } = &mut *self;
             let estimate = estimation.estimate(problem, set, *estimator, kinds, aids, options)?;
-            Ok(self.with_motion_noise(estimate, &prepared)?.of_fewer_rows(prepared.kept()))
+            let of_held = (whole.as_ref(), &held[..]);
+            Ok(self.with_motion_noise(estimate, &prepared, of_held)?.of_fewer_rows(prepared.kept()))
         });
         Ok(estimates.collect())
     }
+}
+
+/// Projects the drives' responses to friction out of `problem`, except where it is `held`. A single run stays as it is: its
+/// low-pass is far slower than the response of a drive at a reversal.
+fn take_out_drive_answers(
+    problem: &mut Problem,
+    clock: &mut Option<FineClock>,
+    model: &Model,
+    prepared: &Prepared,
+    held: &[HeldAtRest],
+) {
+    let Some(acceleration) = &prepared.acceleration else { return };
+    clock.take_if(|clock| clock.samples() != problem.samples);
+    let clock = clock.get_or_insert_with(|| FineClock::new(problem.samples, TICKS));
+    without_drive_answers(problem, clock, model, &prepared.motion, acceleration, held);
 }
 
 #[cfg(test)]

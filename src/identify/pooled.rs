@@ -165,6 +165,11 @@ pub fn pooled(parts: &[Identification], joined: &Regression) -> Identification {
         let named = |found: &DriftingFriction| DriftingFriction { log, ..*found };
         part.drifting_friction.iter().map(named).collect::<Vec<_>>()
     };
+    let held = |(log, part): (usize, &Identification)| {
+        let mut all = part.held_at_rest.clone();
+        all.iter_mut().for_each(|found| found.log = log);
+        all
+    };
     Identification {
         estimator: Estimator::Spectral,
         fit,
@@ -177,6 +182,8 @@ pub fn pooled(parts: &[Identification], joined: &Regression) -> Identification {
         lack_of_fit: lack_of_fit(parts),
         agreement: Some(agreement),
         drifting_friction: parts.iter().enumerate().flat_map(drifting).collect(),
+        may_be_held: Vec::new(),
+        held_at_rest: parts.iter().enumerate().flat_map(held).collect(),
         warnings: joined.prepared.warnings.clone(),
     }
 }

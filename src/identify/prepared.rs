@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::even::BetweenRows;
+use super::held_at_rest::HeldAtRest;
 use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{Gap, HarmonicPower, PeriodicRecord, Replicates};
@@ -61,6 +62,8 @@ pub struct Prepared {
     /// Power density of the velocities' noise, 2 σ²/f_s for white noise, per joint, (rad/s)²/Hz; `None` where the
     /// periods reveal the noise frequency by frequency.
     pub velocity_noise: Option<Vec<f64>>,
+    /// Joints that are known to hold friction in their pauses; where there are none, an identification looks for them.
+    pub held_at_rest: Vec<HeldAtRest>,
     /// Largest magnitude of torque that is read, per joint, where readings are clipped there, Nm; empty unless for a
     /// diagnosis.
     pub torque_limit_nm: Vec<Option<f64>>,

@@ -8,6 +8,7 @@ use super::prepared::{Prepared, Processing};
 use super::problem::Problem;
 
 /// A log laid out for regression.
+#[derive(Clone)]
 pub struct Regression {
     /// X and y of every joint.
     pub problem: Problem,

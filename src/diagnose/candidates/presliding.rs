@@ -26,6 +26,7 @@ use super::*;
 use crate::diagnose::bristles::{Bristles, DRIVES, Drive, Way, column};
 use crate::diagnose::rests::rests;
 use crate::diagnose::rms::rms_where;
+use crate::identify::MOST_HELD;
 
 /// See the module.
 pub struct Presliding;
@@ -44,9 +45,15 @@ const MOST_ERROR_AT_REST: f64 = 0.25;
 /// Standard error of what a joint holds at rest where nothing is said of how it builds up, relative to it: the estimate of
 /// the arm, which knows the pauses without friction, takes up a part. It was 9 to 12 % too small in four logs of another
 /// simulator.
-const HELD_ERROR: f64 = 0.06;
+pub const HELD_ERROR: f64 = 0.06;
 /// Range of stiffnesses that is searched, 1/rad.
 const STIFFNESSES_PER_RAD: [f64; 2] = [20.0, 100_000.0];
+
+/// Form of the law where a joint is held in its pauses, ...
+pub const HELD_AT_REST: &str = "held at rest";
+/// ... and what it is if nothing is known of how it builds up.
+pub const IN_WORDS_AT_REST: &str =
+    "friction that holds it at rest between its moves (presliding or static friction)";
 
 /// Parts of the law; each but the last comes with every one of the [`DRIVES`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,9 +106,6 @@ const LEAST_SHARE: f64 = 0.7;
 const LEAST_SHARE_OF_A_RUN: f64 = 0.25;
 /// The same beside rests, where the noise of the angles at which a joint stops turns bristles round too early.
 const LEAST_SHARE_BESIDE_RESTS: f64 = 0.25;
-/// Largest friction that a joint may hold at rest, relative to its dry friction while it moves: static friction may be
-/// larger (a Stribeck curve), but not by far.
-const MOST_HELD: f64 = 1.5;
 
 /// Root mean square of the friction `b` that is held at rests, Nm.
 fn rms_held(b: &[f64]) -> f64 {
@@ -297,7 +301,7 @@ impl Candidate for Presliding {
         match Part::of(shape) {
             Part::Bristles => None,
             Part::Damped => Some("damped bristles"),
-            Part::BesideRests | Part::Rests => Some("held at rest"),
+            Part::BesideRests | Part::Rests => Some(HELD_AT_REST),
         }
     }
 
@@ -307,9 +311,7 @@ impl Candidate for Presliding {
 
     fn in_words_of(&self, shape: Shape, _: &[f64]) -> &'static str {
         match Part::of(shape) {
-            Part::Rests => {
-                "friction that holds it at rest between its moves (presliding or static friction)"
-            }
+            Part::Rests => IN_WORDS_AT_REST,
             _ => self.in_words(),
         }
     }

@@ -55,7 +55,8 @@ struct OfJoint {
 /// Tests whether noise alone explains the residual on the joints that are looked at; `None` for a single run.
 ///
 /// Per joint and band, Σ r² divided by its degrees of freedom k is distributed as F(k, ν). Here k is the number of rows
-/// less their share in the directions that the null model and `accepted` have fitted (the sum of the leverages), and ν
+/// less their share in the directions that the null model and `accepted` have fitted (the sum of the leverages), and less
+/// the share of pauses that are left out, and ν
 /// the degrees of freedom with which the periods tell the noise power in the band. The smallest probability is
 /// multiplied by the number of tests (Bonferroni).
 pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<LackOfFit> {
@@ -67,10 +68,11 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<L
         directions.map(|d| d.mean[row] * d.mean[row]).sum()
     };
     let band_of = |joint: usize, band: Range<usize>| {
+        let in_motion = 1.0 - study.scene.held_at_rest(joint).map_or(0.0, |held| held.share);
         let (mut square, mut freedom) = (0.0, 0.0);
         for row in band.clone().flat_map(|h| knowledge.rows(h, joint)) {
             square += residual.mean[row] * residual.mean[row];
-            freedom += 1.0 - fitted(row);
+            freedom += in_motion - fitted(row);
         }
         let freedom = freedom.max(1.0);
         let noise = knowledge.freedom_of_band(band, joint);

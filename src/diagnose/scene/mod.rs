@@ -17,7 +17,7 @@ use super::load::{Delivered, LinkTorque, Loads, Periods, RigidArm, rigid_torque_
 use super::reversal_answer::shifted;
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
-use crate::identify::Prepared;
+use crate::identify::{HeldAtRest, Prepared};
 use crate::robot::{Arm, Joint, JointSignals};
 use crate::signal::{FineClock, central_4, linear_at, mean_period};
 use between_samples::BetweenSamples;
@@ -84,6 +84,8 @@ pub struct Scene {
     pub angle_doubt_rad: Vec<f64>,
     /// Magnitude at which torque readings are cut off, Nm; `None` where they are not.
     pub torque_limit_nm: Vec<Option<f64>>,
+    /// Joints that hold friction in their pauses, which are left out of all equations.
+    pub held_at_rest: Vec<HeldAtRest>,
     /// What has been computed between the samples.
     between: BetweenSamples,
     /// Fine clock between the samples of a periodic motion.
@@ -167,6 +169,7 @@ impl Scene {
             noise_nm: (0..joints).map(|j| noise_of_a_free_reading(prepared, j)).collect(),
             angle_doubt_rad: prepared.angle_resolution_rad.iter().map(doubt).collect(),
             torque_limit_nm: prepared.torque_limit_nm.clone(),
+            held_at_rest: prepared.held_at_rest.clone(),
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
             velocity_error_rad_s: (0..joints).map(velocity_error).collect(),
             other_friction: vec![OtherFriction::default(); joints],
@@ -195,6 +198,11 @@ impl Scene {
             sign,
             clock,
         }
+    }
+
+    /// What joint `j` holds in its pauses, if it sticks.
+    pub fn held_at_rest(&self, j: usize) -> Option<&HeldAtRest> {
+        self.held_at_rest.iter().find(|held| held.joint == j)
     }
 
     /// Number of joints.

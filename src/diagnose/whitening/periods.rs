@@ -1,5 +1,7 @@
 //! Whitening of a periodic motion, whose noise is known from the scatter between periods.
 
+use std::borrow::Cow;
+
 use fourier::Forward;
 use nalgebra::Complex;
 use rayon::prelude::*;
@@ -11,7 +13,7 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::image::{Column, Image};
 use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty, rows_of};
 use crate::diagnose::scene::Scene;
-use crate::identify::{FrictionDrift, Panel, Regression};
+use crate::identify::{FrictionDrift, HeldAtRest, Panel, Regression};
 use crate::robot::JointSignals;
 use crate::signal::pooled_level;
 
@@ -32,6 +34,9 @@ use crate::signal::pooled_level;
 /// falls as 1/f²; at f, the kink's component at f_s − f appears as an alias with the share (f/(f_s − f))². The part of
 /// it that is not followed between the samples ([`NOT_FOLLOWED`]) is an error of the equations that is the same in
 /// every period, and is added to S.
+///
+/// A joint that sticks holds any friction in its pauses ([`HeldAtRest`]): there, all signals count as zero, and the scatter
+/// is that of the rest of the period, as a share of all its samples as large as without pauses.
 ///
 /// Torques of unknown height around reversals, on single joints ([`PeriodWhitening::with_noise_of_joints`]) or anywhere
 /// ([`PeriodWhitening::with_repeating_noise`]), are whitened after L⁻¹.
@@ -55,6 +60,8 @@ pub struct PeriodWhitening {
     /// For every joint, its rows and the repeating noise in them.
     of_joints: Vec<(Vec<usize>, RepeatingNoise)>,
     repeating: Option<RepeatingNoise>,
+    /// Joints that hold friction in their pauses, in which no signal counts.
+    held_at_rest: Vec<HeldAtRest>,
 }
 
 /// Share of the Coulomb friction whose kink is not followed between samples.
@@ -71,7 +78,10 @@ const BELOW_HIGHEST: f64 = 0.02;
 impl PeriodWhitening {
     /// Whitening from the periods of a log.
     pub fn new(regression: &Regression, scene: &Scene, log: &str) -> Result<Self, DiagnoseError> {
-        let problem = &regression.problem;
+        let mut problem = Cow::Borrowed(&regression.problem);
+        for held in &scene.held_at_rest {
+            held.leave_out(problem.to_mut());
+        }
         let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());
         let forward = fourier::forward(n);
         let mut whitening = Self {
@@ -87,6 +97,7 @@ impl PeriodWhitening {
             stepping: None,
             of_joints: Vec::new(),
             repeating: None,
+            held_at_rest: scene.held_at_rest.clone(),
         };
         let used = ((regression.prepared.highest - BELOW_HIGHEST) * n as f64).round() as usize;
         let used = used.min(scene.highest);
@@ -288,6 +299,9 @@ impl PeriodWhitening {
             let _ = inverse.process(spectrum, out.joint_mut(j));
             out.joint_mut(j).iter_mut().for_each(|v| *v *= scale);
         }
+        for held in &self.held_at_rest {
+            held.silence(out.joint_mut(held.joint));
+        }
         out
     }
 
@@ -322,14 +336,24 @@ impl PeriodWhitening {
         }
     }
 
+    /// The signal `y` of joint `j`, of one period or of all, with zeros in pauses that are left out.
+    fn in_motion<'y>(&self, j: usize, y: &'y [f64]) -> Cow<'y, [f64]> {
+        let mut y = Cow::Borrowed(y);
+        for held in self.held_at_rest.iter().filter(|held| held.joint == j) {
+            y.to_mut().chunks_exact_mut(self.samples).for_each(|period| held.silence(period));
+        }
+        y
+    }
+
     /// [`Self::image`] without whitening for noise that repeats.
     pub(super) fn image_in_noise(&self, column: &Column) -> Image {
         let n = self.samples;
         let repeats = column.parts.iter().all(|(_, y)| y.len() == n);
         let weight = self.of_mean.sqrt();
+        let parts: Vec<(usize, Cow<[f64]>)> =
+            column.parts.iter().map(|(j, y)| (*j, self.in_motion(*j, y))).collect();
         if repeats {
-            let spectra: Vec<_> =
-                column.parts.iter().map(|(j, y)| (*j, self.spectrum(y))).collect();
+            let spectra: Vec<_> = parts.iter().map(|(j, y)| (*j, self.spectrum(y))).collect();
             return Image { mean: self.rows(&spectra, weight), contrast: Vec::new() };
         }
         let periods: Vec<Vec<(usize, Vec<Complex<f64>>)>> = (0..self.periods)
@@ -337,7 +361,7 @@ impl PeriodWhitening {
                 let part = |y: &'_ [f64]| {
                     self.spectrum(if y.len() == n { y } else { &y[p * n..(p + 1) * n] })
                 };
-                column.parts.iter().map(|(j, y)| (*j, part(y))).collect()
+                parts.iter().map(|(j, y)| (*j, part(y))).collect()
             })
             .collect();
         // Helmert contrasts: period c against the mean of the periods before it.
@@ -380,6 +404,7 @@ impl PeriodWhitening {
             stepping: None,
             of_joints: Vec::new(),
             repeating: None,
+            held_at_rest: Vec::new(),
         }
     }
 }

@@ -6,6 +6,7 @@
 mod declined;
 mod drift;
 mod foreign;
+mod held;
 mod intervals;
 mod page;
 mod short_names;
@@ -17,6 +18,7 @@ use serde::Serialize;
 pub use declined::{Declined, NOTHING_MOVES};
 use declined::{remedy, rest_in_words};
 pub use drift::DriftResult;
+pub use held::HeldResult;
 pub use intervals::{AgreementResult, Intervals, TestResult};
 pub use page::{facts, page, parameter_table, residual_table};
 
@@ -122,6 +124,7 @@ impl Training<'_> {
             self.logs.iter().flat_map(|log| log_warnings(log)).collect();
         warnings.extend(identification.warnings.clone());
         warnings.extend(drift::remarks(self));
+        warnings.extend(held::remarks(self));
         warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
         warnings.extend(few_degrees_of_freedom(identification.covariance.degrees_of_freedom));
         warnings.extend(doubt.map(Doubt::sentence));
@@ -232,6 +235,8 @@ pub struct Result {
     explainable_nm: Option<Vec<f64>>,
     /// Friction that drifts along the logs.
     drifting_friction: Vec<DriftResult>,
+    /// Friction that joints hold in their pauses.
+    held_at_rest: Vec<HeldResult>,
     intervals: Intervals,
     condition: Condition,
     not_identified: Vec<String>,
@@ -336,6 +341,7 @@ impl Result {
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
             explainable_nm: identification.explainable_nm.clone(),
             drifting_friction: DriftResult::all(training),
+            held_at_rest: HeldResult::all(training),
             intervals: Intervals::of(training),
             condition: Condition::of(&regression.problem, set)?,
             verdict: training.verdict(&open, doubt.as_ref()),

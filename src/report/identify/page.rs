@@ -64,6 +64,12 @@ pub fn residual_table(result: &Result) -> Table {
         if of_drift.iter().any(|nm| *nm > 0.0) {
             row("friction that drifts, beside its mean".into(), "Nm", &of_drift);
         }
+        let held = |j: usize| result.held_at_rest.iter().find(|held| held.joint == j + 1);
+        let of_held: Vec<f64> =
+            (0..joints).map(|j| held(j).map_or(0.0, |held| held.held_nm)).collect();
+        if of_held.iter().any(|nm| *nm > 0.0) {
+            row("friction held in pauses (left out of the fit)".into(), "Nm", &of_held);
+        }
     }
     for (v, name) in result.validation.iter().zip(validation_names(result)) {
         row(format!("{name}: prediction"), "Nm", &v.residual.rms_nm);
