@@ -14,7 +14,7 @@ const MOST: usize = 60;
 
 /// The samples of each pause of joint `j` along one period of the velocities `qd_rad_s`, sampled at `rate_hz`; ε is
 /// `epsilon_rad_s`. None for a joint that does not move, whose slow stretches lie between no moves; and where there are
-/// more than [`MOST`].
+/// more than 60.
 pub fn pauses(
     qd_rad_s: &JointSignals,
     j: usize,
@@ -29,7 +29,7 @@ pub fn pauses(
 }
 
 /// The samples of each run of at least `least` of the periodic velocities `qd_rad_s` that stay below `limit_rad_s`; none
-/// if there are more than [`MOST`].
+/// if there are more than 60.
 fn slow_runs(qd_rad_s: &[f64], limit_rad_s: f64, least: usize) -> Vec<Vec<usize>> {
     let n = qd_rad_s.len();
     let is_slow = |k: usize| qd_rad_s[k % n].abs() < limit_rad_s;
