@@ -1,5 +1,6 @@
 //! The extended model: base parameters and effects, fitted together.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -203,22 +204,21 @@ impl Extension {
         out
     }
 
-    /// The same model with no friction on joint `j`.
-    pub fn without_friction_of(
+    /// The same model without Coulomb friction on `joints`, and without effects of the friction families there.
+    pub fn without_dry_friction(
         &self,
-        j: usize,
+        joints: Range<usize>,
         set: &BaseSet,
         families: &[Box<dyn Candidate>],
     ) -> Self {
-        let mut out = self.clone();
-        for parameter in [Parameter::Coulomb(j), Parameter::Viscous(j)] {
-            set.index_of(parameter).into_iter().for_each(|k| out.theta[k] = 0.0);
+        let mut bare = self.clone();
+        let acts = |effect: &Effect| effect.site.is_none_or(|own| joints.contains(&own));
+        let is_friction = |effect: &Effect| families[effect.family].kind().is_friction();
+        bare.effects.retain(|effect| !(acts(effect) && is_friction(effect)));
+        for k in joints.filter_map(|j| set.index_of(Parameter::Coulomb(j))) {
+            bare.theta[k] = 0.0;
         }
-        out.answers.retain(|(joint, ..)| *joint != j);
-        let acts = |effect: &Effect| effect.site.is_none_or(|own| own == j);
-        out.effects
-            .retain(|effect| !(acts(effect) && families[effect.family].kind().is_friction()));
-        out
+        bare
     }
 
     /// Predicted torque of one period (or of the run) as the regression sees it, Nm: joints × samples of `problem`.

@@ -64,7 +64,8 @@ impl Diagnoser<'_> {
         let sticks = |own: HeldAtRest| {
             let j = own.joint;
             let coulomb_nm = self.set.index_of(Parameter::Coulomb(j)).map_or(0.0, |k| theta[k]);
-            let bare = residual(study, &model.without_friction_of(j, self.set, study.families));
+            let bare = model.without_dry_friction(j..j + 1, self.set, study.families);
+            let bare = residual(study, &bare);
             let frictionless_nm = bare.joint(j);
             // Other laws than Coulomb's have not been tested at rest.
             let mut left_nm = left_nm.joint(j).to_vec();
@@ -80,8 +81,8 @@ impl Diagnoser<'_> {
 }
 
 /// Adds what joints hold in their pauses to the `causes`: to the presliding of the joint, or as a cause of its own. It is
-/// what the extended `model` leaves there on average, pause by pause, if the joint has no friction, and is taken out of
-/// its residual `after_nm`. The null model leaves `before_nm`; the noise of the mean period has the rms `noise_nm` per
+/// what the extended `model` leaves there on average, pause by pause, if the joint has no dry friction, and is taken out
+/// of its residual `after_nm`. The null model leaves `before_nm`; the noise of the mean period has the rms `noise_nm` per
 /// joint.
 pub(super) fn add_held(
     (study, set): (&Study, &BaseSet),
@@ -92,17 +93,25 @@ pub(super) fn add_held(
     let problem = &study.regression.problem;
     for held in &study.scene.held_at_rest {
         let j = held.joint;
-        let without_friction = model.without_friction_of(j, set, study.families);
-        let left = residual(study, &without_friction);
+        let left = residual(study, &model.without_dry_friction(j..j + 1, set, study.families));
         let levels = held.levels(left.joint(j));
         let mut removed = 0.0;
         for (at, level) in held.pauses.iter().zip(&levels) {
             at.iter().for_each(|k| after_nm.joint_mut(j)[*k] = left.joint(j)[*k] - level);
             removed += at.len() as f64 * level * level;
         }
-        let errors = held.errors_of_levels(&problem.panels[j].y, problem.samples);
-        let square: f64 =
-            levels.iter().zip(&errors).map(|(level, error)| (level / error).powi(2)).sum();
+        let all: f64 = before_nm.joint(j).iter().map(|e| e * e).sum();
+        let noise = noise_nm.map_or(0.0, |nm| nm[j]);
+        let explainable = (all - problem.samples as f64 * noise * noise).max(removed);
+        let gain = removed / explainable;
+
+        let scatter = held.errors_of_levels(&problem.panels[j].y, problem.samples);
+        let white = |at: &Vec<usize>| {
+            study.scene.noise_nm[j] / ((at.len() * problem.periods) as f64).sqrt()
+        };
+        // Coarse readings may be the same in all periods.
+        let errors: Vec<f64> =
+            scatter.iter().zip(&held.pauses).map(|(own, at)| own.max(white(at))).collect();
         let held_nm = rms_where(&levels, |_| true);
         let off = QUANTILE_95 * (HELD_ERROR * held_nm).hypot(rms_where(&errors, |_| true));
         let estimate =
@@ -112,20 +121,16 @@ pub(super) fn add_held(
         if let Some(cause) = causes.iter_mut().find(is_presliding) {
             cause.parameters.insert("held_nm", estimate);
             cause.form = Some(HELD_AT_REST);
+            cause.gain_fraction.get_or_insert(gain);
             continue;
         }
-        let all: f64 = before_nm.joint(j).iter().map(|e| e * e).sum();
-        let noise = noise_nm.map_or(0.0, |nm| nm[j]);
-        let explainable = (all - problem.samples as f64 * noise * noise).max(removed);
-        let mut cause = Cause::certain(
-            Kind::Presliding,
-            Some(j),
-            IN_WORDS_AT_REST,
-            square.sqrt(),
-            &[("held_nm", estimate)],
-        );
+        let square: f64 =
+            levels.iter().zip(&errors).map(|(level, error)| (level / error).powi(2)).sum();
+        let held = [("held_nm", estimate)];
+        let mut cause =
+            Cause::certain(Kind::Presliding, Some(j), IN_WORDS_AT_REST, square.sqrt(), &held);
         cause.form = Some(HELD_AT_REST);
-        cause.gain_fraction = Some(removed / explainable);
+        cause.gain_fraction = Some(gain);
         cause.make_provisional();
         causes.push(cause);
     }

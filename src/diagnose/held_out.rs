@@ -65,7 +65,7 @@ pub(super) fn held_out_gain(
     let rows = Rows::of(&regression);
     let coulomb: Vec<f64> = (0..joints).map(|j| coulomb_nm(set, &models.null.theta, j)).collect();
     let outside_friction = |model: &Extension| {
-        let bare = without_friction(model, (set, joints), families);
+        let bare = model.without_dry_friction(0..joints, set, families);
         let mut e = error(model);
         let free = error(&bare);
         for (j, coulomb) in coulomb.iter().enumerate() {
@@ -182,18 +182,4 @@ fn without_friction_of(
 /// Coulomb friction of joint `j` in the base parameters `theta`, Nm.
 fn coulomb_nm(set: &BaseSet, theta: &[f64], j: usize) -> f64 {
     set.index_of(Parameter::Coulomb(j)).map_or(0.0, |k| theta[k].abs())
-}
-
-/// `model` without its Coulomb friction and without effects of the friction families.
-fn without_friction(
-    model: &Extension,
-    (set, joints): (&BaseSet, usize),
-    families: &[Box<dyn Candidate>],
-) -> Extension {
-    let mut bare = model.clone();
-    bare.effects.retain(|effect| !families[effect.family].kind().is_friction());
-    for k in (0..joints).filter_map(|j| set.index_of(Parameter::Coulomb(j))) {
-        bare.theta[k] = 0.0;
-    }
-    bare
 }
