@@ -72,6 +72,7 @@
 
 pub mod base;
 pub mod cli;
+mod cumulative_sum;
 pub mod diagnose;
 mod dot;
 pub mod dynamics;

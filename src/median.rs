@@ -25,6 +25,23 @@ pub fn trimmed_mean(values: &mut [f64]) -> Option<f64> {
     Some(inner.iter().sum::<f64>() / inner.len() as f64)
 }
 
+/// The value nearest to `share` (0…1) of the way from the first to the last of an ascending list: 0 gives the smallest
+/// value, 1 the largest. Zero for an empty list. [`upper_quantile`] counts values instead.
+pub fn nearest_quantile(ascending: &[f64], share: f64) -> f64 {
+    let last = ascending.len().saturating_sub(1);
+    ascending.get((share * last as f64).round() as usize).copied().unwrap_or(0.0)
+}
+
+/// The smallest of the `values` that more than this `share` (from 0, and below 1) of them do not exceed: of ten values,
+/// the largest for 0.9, where [`nearest_quantile`] is the second largest. The values are reordered; `None` without any.
+pub fn upper_quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let place = (share * values.len() as f64) as usize;
+    Some(*values.select_nth_unstable_by(place, f64::total_cmp).1)
+}
+
 /// Standard deviation of Gaussian values from the median of their `sizes` |x|: median/0.6745. The sizes are reordered;
 /// zero without any size.
 pub fn robust_sigma(sizes: &mut [f64]) -> f64 {
@@ -78,8 +95,7 @@ impl UsualStep {
         if (uneven as f64) < OFTEN * steps.len() as f64 {
             return Some(Self { typical_s, longest_s: typical_s });
         }
-        let place = (USUAL * steps.len() as f64) as usize;
-        let longest_s = *steps.select_nth_unstable_by(place, f64::total_cmp).1;
+        let longest_s = upper_quantile(&mut steps, USUAL)?;
         Some(Self { typical_s, longest_s })
     }
 
@@ -142,6 +158,19 @@ mod tests {
         assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), Some(2.5));
         assert_eq!(median(&mut [7.0]), Some(7.0));
         assert_eq!(median(&mut []), None);
+    }
+
+    /// The place 0.9 · 9 = 8.1 among 0 … 9 is nearest to that of the second largest of ten values, which nine do not
+    /// exceed; more than nine do not exceed the largest.
+    #[test]
+    fn one_quantile_is_the_nearest_and_the_other_the_upper() {
+        let ascending: Vec<f64> = (1..=10).map(f64::from).collect();
+        assert_eq!([0.0, 0.9, 1.0].map(|p| nearest_quantile(&ascending, p)), [1.0, 9.0, 10.0]);
+        assert_eq!(nearest_quantile(&[], 0.9), 0.0);
+        let mut values: Vec<f64> = ascending.into_iter().rev().collect();
+        let upper = [0.0, 0.89, 0.9].map(|share| upper_quantile(&mut values, share));
+        assert_eq!(upper, [Some(1.0), Some(9.0), Some(10.0)]);
+        assert_eq!(upper_quantile(&mut [], 0.9), None);
     }
 
     #[test]

@@ -6,8 +6,8 @@ use crate::identify::Measurement;
 use crate::robot::JointSignals;
 use crate::signal::{Filled, Gap, SignalError, Tears, fill_gaps};
 
-/// How far a joint may turn between two rows beyond what its speed explains, rad.
-const TORN_RAD: f64 = 0.05;
+/// A joint that turns between two rows by more than this beyond what its speed explains jumps in the record, rad.
+const JUMP_RAD: f64 = 0.05;
 /// Factor by which a joint may have been faster between two rows than at either of them.
 const FASTER: f64 = 3.0;
 /// How far in time a filter spreads the effect of a jump in the record, s.
@@ -22,7 +22,7 @@ pub fn is_torn(m: &Measurement, [start_s, end_s]: [f64; 2]) -> bool {
         (0..m.q_rad.joints()).any(|j| {
             let (q, qd) = (m.q_rad.joint(j), m.qd_rad_s.joint(j));
             let speed = qd[k].abs().max(qd[k - 1].abs());
-            (q[k] - q[k - 1]).abs() > TORN_RAD + FASTER * speed * step_s
+            (q[k] - q[k - 1]).abs() > JUMP_RAD + FASTER * speed * step_s
         })
     })
 }

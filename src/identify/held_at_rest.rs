@@ -41,6 +41,8 @@ pub struct HeldAtRest {
 const STANDS_OUT: f64 = 3.0;
 /// Rms of what is held over its scatter between the periods from which on it is no noise.
 const CERTAIN: f64 = 10.0;
+/// Smallest friction that is called held, relative to that in motion: a description of friction near rest is not exact.
+const LEAST_HELD: f64 = 0.05;
 /// Largest friction that a joint may hold at rest, relative to its dry friction while it moves: static friction may be
 /// larger (a Stribeck curve), but not by far. Any torque that depends on the pose is constant at rest.
 pub const MOST_HELD: f64 = 1.5;
@@ -115,7 +117,8 @@ impl HeldAtRest {
         let stands_out =
             rms_of_means(&self.pauses) > STANDS_OUT * rms_of_means(&self.runs_between(n));
         let held_nm = rms(&self.levels(frictionless_nm));
-        let sticks = stands_out && held_nm < MOST_HELD * coulomb_nm;
+        let is_of_friction = (LEAST_HELD..MOST_HELD).contains(&(held_nm / coulomb_nm));
+        let sticks = stands_out && is_of_friction;
         Some(Self { held_nm, sticks, ..self })
     }
 
@@ -145,22 +148,23 @@ impl HeldAtRest {
         runs.map(<[usize]>::to_vec).collect()
     }
 
-    /// Leaves the rows of the pauses out of `problem`.
-    ///
-    /// Their regressor and their torque become zero. The scatter between periods remains the noise by which harmonics
-    /// are weighted, and is that of the rows that are left: as a share of all rows it is as large as without pauses, so
-    /// that σ is that of fewer rows.
+    /// Leaves the rows of the pauses out of `problem`: their regressor and their torque become zero.
     pub fn leave_out(&self, problem: &mut Problem) {
         let n = problem.samples;
         let panel = &mut problem.panels[self.joint];
-        for column in panel.x.chunks_exact_mut(n) {
-            self.silence(column);
-        }
-        let mean = mean_period(&panel.y, n);
+        let columns = panel.x.chunks_exact_mut(n).chain(panel.y.chunks_exact_mut(n));
+        columns.for_each(|column| self.silence(column));
+    }
+
+    /// Spreads the scatter between periods, of which nothing is left in the pauses, over all rows: as a share of all, it is
+    /// as large as without pauses. If harmonics are weighted by that scatter, σ is then that of the rows that are left.
+    pub fn spread_scatter(&self, problem: &mut Problem) {
+        let n = problem.samples;
+        let y = &mut problem.panels[self.joint].y;
+        let mean = mean_period(y, n);
         let growth = 1.0 / (1.0 - self.share).sqrt();
-        for period in panel.y.chunks_exact_mut(n) {
+        for period in y.chunks_exact_mut(n) {
             period.iter_mut().zip(&mean).for_each(|(y, mean)| *y = mean + growth * (*y - mean));
-            self.silence(period);
         }
     }
 
@@ -263,6 +267,7 @@ mod tests {
         let mut moving = problem(|k| [0.0, 2.0, 0.0, -1.0][k / 100]);
         let paused = paused();
         paused.leave_out(&mut moving);
+        paused.spread_scatter(&mut moving);
         let Panel { x, y } = &moving.panels[0];
         for k in paused.pauses.iter().flatten() {
             assert!(x[*k] == 0.0 && y.iter().skip(*k).step_by(N).all(|y| *y == 0.0), "{k}");

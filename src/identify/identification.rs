@@ -69,14 +69,14 @@ impl Identification {
 /// Rms per joint of the repeating torque that is not explained, Nm. `residual_squares` are ‖e_j‖² over all periods,
 /// left by a fit of `parameters` parameters. From them the scatter between periods is subtracted, and from the mean
 /// period the share of its noise σ²/P that the fit leaves. Filled-in rows lower P and the scatter to the parts that
-/// are `kept` ([`Prepared::kept`](super::Prepared::kept)). Rows in which friction is `held` are not among those of the
-/// residual, but their share of the scatter is ([`HeldAtRest::leave_out`]).
+/// are `kept` ([`Prepared::kept`](super::Prepared::kept)). Where friction is held in pauses, `shares` are those of the rows
+/// of joint j that are left, and of their scatter in the residual.
 pub(super) fn explainable(
     residual_squares: &[f64],
     parameters: usize,
     replicates: &Replicates,
     kept: [f64; 2],
-    held: &[HeldAtRest],
+    shares: impl Fn(usize) -> [f64; 2],
 ) -> Vec<f64> {
     let n = replicates.mean.samples() as f64;
     let periods = replicates.periods as f64;
@@ -85,10 +85,10 @@ pub(super) fn explainable(
     pairs
         .map(|(j, (squares, sigma))| {
             let variance = sigma * sigma;
-            let left_out = held.iter().find(|held| held.joint == j).map_or(0.0, |held| held.share);
-            let used = n * (1.0 - left_out);
+            let [used, scattered] = shares(j).map(|share| share * n);
             let fitted = parameters as f64 / (joints * used);
-            let of_mean = (squares - kept[1] * variance * n * (periods - 1.0)) / (used * periods);
+            let scatter = kept[1] * variance * scattered * (periods - 1.0);
+            let of_mean = (squares - scatter) / (used * periods);
             (of_mean - variance / (kept[0] * periods) * (1.0 - fitted)).max(0.0).sqrt()
         })
         .collect()
@@ -128,7 +128,7 @@ mod tests {
         let mut replicates = replicate_noise(&signals, N).unwrap();
         replicates.sigma[0] /= kept[1].sqrt();
         let squares = y.iter().map(|y| y * y).sum::<f64>();
-        let found = explainable(&[squares], 0, &replicates, kept, &[])[0];
+        let found = explainable(&[squares], 0, &replicates, kept, |_| [1.0; 2])[0];
         assert!((0.257..0.338).contains(&found), "{found}");
     }
 }

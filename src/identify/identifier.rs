@@ -326,7 +326,9 @@ impl<'a> Identifier<'a> {
         };
         let drifts = self.take_out_drift(&mut prepared);
         let (held, may_be_held) = self.held_at_rest(&prepared);
-        let whole = self.only_moving(&prepared, &held);
+        let whole = self.with_answers_out(&prepared, &held);
+        let by_harmonics = weighs_harmonics(estimator, &[kind]);
+        leave_out(&mut self.problem, &held, by_harmonics);
         let aids = MotionAids { acceleration: prepared.acceleration.as_deref(), instruments };
         let estimate = self.estimation.estimate(
             &self.problem,
@@ -342,7 +344,12 @@ impl<'a> Identifier<'a> {
         let Estimate { mut fit, mut covariances, lack_of_fit } = estimate;
         let covariance = covariances.swap_remove(0).map_err(without)?;
         let explainable_nm = prepared.replicates.as_ref().map(|replicates| {
-            explainable(&fit.residual_squares, fit.theta.len(), replicates, prepared.kept(), &held)
+            let shares = |j: usize| {
+                let left_out = held.iter().find(|held| held.joint == j).map_or(0.0, |h| h.share);
+                [1.0 - left_out, if by_harmonics { 1.0 } else { 1.0 - left_out }]
+            };
+            let (squares, parameters) = (&fit.residual_squares, fit.theta.len());
+            explainable(squares, parameters, replicates, prepared.kept(), shares)
         });
         if let Some(whole) = whole {
             self.problem = whole;
@@ -398,19 +405,17 @@ impl<'a> Identifier<'a> {
         let all =
             HeldAtRest::of(problem, set, &motion.qd_rad_s, epsilon_rad_s, |moving, pauses| {
                 take_out_drive_answers(moving, clock, model, prepared, pauses);
-                pauses.iter().for_each(|pause| pause.leave_out(moving));
+                leave_out(moving, pauses, false);
             });
         all.into_iter().partition(|held| held.sticks)
     }
 
-    /// Takes the drives' responses to friction out of the problem, and the rows of the log `prepared` in which friction is
-    /// `held`. Returns the problem with these rows, if there are any.
-    fn only_moving(&mut self, prepared: &Prepared, held: &[HeldAtRest]) -> Option<Problem> {
+    /// Takes the drives' responses to friction out of the problem. Returns the problem if friction is `held` in some of its
+    /// rows.
+    fn with_answers_out(&mut self, prepared: &Prepared, held: &[HeldAtRest]) -> Option<Problem> {
         let Self { clock, problem, model, .. } = self;
         take_out_drive_answers(problem, clock, model, prepared, held);
-        let whole = (!held.is_empty()).then(|| problem.clone());
-        held.iter().for_each(|held| held.leave_out(problem));
-        whole
+        (!held.is_empty()).then(|| problem.clone())
     }
 
     /// Returns `estimate` of the log `prepared`. Where its model fails against the scatter of the torque, it is
@@ -434,7 +439,7 @@ impl<'a> Identifier<'a> {
         let (mean, theta) = (&prepared.motion, &estimate.fit.theta);
         let whole = whole.unwrap_or(problem);
         let mut moved = moved_to_mean(whole, assembler, model, mean, &deviations, theta);
-        held.iter().for_each(|held| held.leave_out(&mut moved));
+        leave_out(&mut moved, held, true);
         let lack_of_fit = Some(self.estimation.lack_of_fit(&moved, set, acceleration)?);
         Ok(Estimate { lack_of_fit, ..estimate }.without_pauses(held, moved.joints()))
     }
@@ -450,18 +455,37 @@ impl<'a> Identifier<'a> {
         let instruments = self.instruments_for(by_instruments, &prepared)?;
         self.take_out_drift(&mut prepared);
         let (held, _) = self.held_at_rest(&prepared);
-        let whole = self.only_moving(&prepared, &held);
+        let whole = self.with_answers_out(&prepared, &held);
         let aids = MotionAids {
             acceleration: prepared.acceleration.as_deref(),
             instruments: instruments.as_ref(),
         };
         let estimates = methods.iter().map(|(estimator, kinds)| {
             let Self { estimation, problem, set, options, .. } = &mut *self;
+            if let Some(whole) = &whole {
+                problem.clone_from(whole);
+                leave_out(problem, &held, weighs_harmonics(*estimator, kinds));
+            }
             let estimate = estimation.estimate(problem, set, *estimator, kinds, aids, options)?;
             let of_held = (whole.as_ref(), &held[..]);
             Ok(self.with_motion_noise(estimate, &prepared, of_held)?.of_fewer_rows(prepared.kept()))
         });
         Ok(estimates.collect())
+    }
+}
+
+/// Whether an estimate, or one of its covariances, weighs harmonics by the scatter between periods.
+fn weighs_harmonics(estimator: Estimator, kinds: &[CovarianceKind]) -> bool {
+    estimator == Estimator::Spectral || kinds.contains(&CovarianceKind::Spectral)
+}
+
+/// Leaves the rows in which friction is `held` out of `problem`, whose harmonics may be weighted by their scatter.
+fn leave_out(problem: &mut Problem, held: &[HeldAtRest], by_harmonics: bool) {
+    for held in held {
+        held.leave_out(problem);
+        if by_harmonics {
+            held.spread_scatter(problem);
+        }
     }
 }
 

@@ -354,6 +354,7 @@ fn experiment_window(activity: &Activity) -> Option<Range<usize>> {
 mod tests {
     use super::*;
     use crate::signal::fill_gaps;
+    use crate::signal::repeated_motions::{minimum_jerk, moves_with_pauses};
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
 
@@ -446,28 +447,17 @@ mod tests {
     fn cycles_with_pauses_are_put_on_a_clock_that_fits() {
         const PERIOD_S: f64 = 10.97;
         const RATE_HZ: f64 = 125.0;
-        const MOVES: usize = 4;
         const MOVING: f64 = 0.12;
-        let way = |j: usize, m: usize| ((j + 1) as f64 * (m + 2) as f64).sin();
-        let step = |j: usize, m: usize| match m {
-            3 => -(0..3).map(|m| way(j, m)).sum::<f64>(),
-            _ => way(j, m),
-        };
         let samples = (6.2 * PERIOD_S * RATE_HZ) as usize;
         let time_s: Vec<f64> = (0..samples).map(|k| k as f64 / RATE_HZ).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
-        // How far each move has come, from 0 to 1.
-        let come = |m: usize, t: f64| {
-            (((t / PERIOD_S).fract() - m as f64 / MOVES as f64) / MOVING).clamp(0.0, 1.0)
-        };
-        let mut of = |sigma: f64, f: &dyn Fn(f64) -> f64| {
+        let mut of = |sigma: f64, progress: &dyn Fn(f64) -> f64| {
             JointSignals::from_fn(2, samples, |j, k| {
-                let sum = (0..MOVES).map(|m| step(j, m) * f(come(m, time_s[k]))).sum::<f64>();
-                sum + sigma * noise()
+                moves_with_pauses(j, time_s[k] / PERIOD_S, MOVING, progress) + sigma * noise()
             })
         };
-        let q_rad = of(2e-5, &|s| s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s));
+        let q_rad = of(2e-5, &minimum_jerk);
         let rate = 30.0 / (MOVING * PERIOD_S);
         let qd_rad_s = of(1e-3, &|s| rate * (s * (1.0 - s)).powi(2));
         let torque_nm = of(1.0, &|s| 9.0 * s);

@@ -8,7 +8,7 @@
 use std::f64::consts::TAU;
 
 use super::clean::Motion;
-use crate::median::median;
+use crate::median::{median, upper_quantile};
 
 /// Advances that are used on each side where there are no velocities, or where these are late.
 const BESIDE: usize = 2;
@@ -107,18 +107,9 @@ fn product(a: &[Vec<f64>], b: &[Vec<f64>], k: usize) -> f64 {
 
 /// The rows that the arm reaches fast, by the `sizes` of what one step adds; `None` if it never moves.
 fn fast(sizes: &[f64]) -> Option<Vec<usize>> {
-    let usual = quantile(sizes.get(1..)?.to_vec(), USUAL)?;
+    let usual = upper_quantile(&mut sizes.get(1..)?.to_vec(), USUAL)?;
     let is_fast = |k: &usize| sizes[*k] >= FAST * usual;
     (usual > 0.0).then(|| (1..sizes.len()).filter(is_fast).collect())
-}
-
-/// The value that this `share` of the `values` does not exceed; `None` without any.
-fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let place = (share * values.len() as f64) as usize;
-    Some(*values.select_nth_unstable_by(place, f64::total_cmp).1)
 }
 
 /// How far the angles advanced, and how far one step leads.
@@ -149,9 +140,11 @@ impl<'a> Advance<'a> {
         let fast = fast(&sizes_rad)?;
         let mut new = Self { moved, one, sizes_rad, along, usual_rad: 0.0, usual_along_rad: 0.0 };
         let missed = |k: &usize| new.missed_rad(*k, new.nearest(*k, apart));
-        let usual_rad = quantile(fast.iter().map(missed).collect(), USUAL)?;
+        let mut missed_rad: Vec<f64> = fast.iter().map(missed).collect();
+        let usual_rad = upper_quantile(&mut missed_rad, USUAL)?;
         let missed = |k: &usize| (new.along[*k] - new.nearest(*k, apart)).abs() * new.sizes_rad[*k];
-        let usual_along_rad = quantile(fast.iter().map(missed).collect(), USUAL)?;
+        let mut missed_rad: Vec<f64> = fast.iter().map(missed).collect();
+        let usual_along_rad = upper_quantile(&mut missed_rad, USUAL)?;
         new.usual_rad = usual_rad;
         new.usual_along_rad = usual_along_rad;
         Some(new)

@@ -16,6 +16,7 @@ use super::clean::Motion;
 use super::even_stamps::{FEWEST_ROWS, StampLine};
 use super::row_steps::RowSteps;
 use super::running::Running;
+use crate::cumulative_sum::accumulate;
 use crate::median::{median, robust_sigma};
 
 /// Rows over which the step of the grid is measured. Many stretches of a motion last that long without a rest or a gap.
@@ -62,15 +63,6 @@ pub(super) fn stamp_pieces(motion: &Motion) -> Option<(Vec<f64>, Vec<LogWarning>
     Some((line.even_s, warnings))
 }
 
-/// The sums of the `values` up to each of them.
-fn cumulated(values: &[f64]) -> Vec<f64> {
-    let add = |sum: &mut f64, value: &f64| {
-        *sum += value;
-        Some(*sum)
-    };
-    values.iter().scan(0.0, add).collect()
-}
-
 /// How much later the promptest rows `behind` are than those `before`, s.
 fn later_s(before: &[f64], behind: &[f64]) -> f64 {
     prompt_s(behind) - prompt_s(before)
@@ -96,12 +88,11 @@ impl Pieces {
     fn new(motion: &Motion) -> Option<Self> {
         let counted = RowSteps::of(motion)?;
         let (time_s, rows) = (motion.time_s, motion.rows());
-        let place = cumulated(&counted.steps);
-        let count = |sum: &mut usize, is_clear: &bool| {
-            *sum += usize::from(*is_clear);
-            Some(*sum)
-        };
-        let clear_until: Vec<usize> = counted.are_clear.iter().scan(0, count).collect();
+        let mut place = counted.steps.clone();
+        accumulate(&mut place);
+        let mut clear_until: Vec<usize> =
+            counted.are_clear.iter().copied().map(usize::from).collect();
+        accumulate(&mut clear_until);
         let are_clear = |from: usize, to: usize| clear_until[to] - clear_until[from] == to - from;
         let slope_s = |k: usize| (time_s[k + SPAN] - time_s[k]) / (place[k + SPAN] - place[k]);
         let spans = (0..rows - SPAN).filter(|k| are_clear(*k, *k + SPAN));
@@ -247,7 +238,8 @@ impl Pieces {
         let off_s = |k: usize, level_s: f64| (late_s[k - first] - level_s).abs();
         // How badly the stamps fit if the step is in front of a row.
         let costs = |k: usize| off_s(k, before_s) - off_s(k, before_s + size_s);
-        let costs = cumulated(&(from..to).map(costs).collect::<Vec<f64>>());
+        let mut costs: Vec<f64> = (from..to).map(costs).collect();
+        accumulate(&mut costs);
         let cost = |k: usize| if k == from { 0.0 } else { costs[k - from - 1] };
         let scatter_s = |k: usize| off_s(k, before_s).min(off_s(k, before_s + size_s));
         let usual_s = median(&mut (from..=to).map(scatter_s).collect::<Vec<f64>>())?;
@@ -270,11 +262,11 @@ impl Pieces {
 
     /// The line through all stamps, less what the clock was set by, over the places of the rows on the grid.
     fn line(&mut self, time_s: &[f64]) -> Option<StampLine> {
-        let mut set_s = vec![0.0; time_s.len()];
+        let mut set_s: Vec<f64> = vec![0.0; time_s.len()];
         for (k, by_s) in &self.set_s {
             set_s[*k] += by_s;
         }
-        let set_s = cumulated(&set_s);
+        accumulate(&mut set_s);
         let unset_s: Vec<f64> = time_s.iter().zip(&set_s).map(|(t, set)| t - set).collect();
         StampLine::along(&unset_s, self.place.of(0..time_s.len()))
     }

@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use super::error::{SignalError, checked_rate_hz, enough};
-use super::noise::{block_noise, quantile};
+use super::noise::block_noise;
 use super::readings::resolution;
+use crate::median::nearest_quantile;
 use crate::robot::JointSignals;
 
 /// Length of the blocks in which the noise is estimated, s.
@@ -60,7 +61,7 @@ impl Activity {
                 let value = series[sample];
                 return Err(SignalError::NotFinite { what: "velocity", joint: j, sample, value });
             }
-            let noise = quantile(&block_noise(series, block.max(16)), QUIET_SHARE);
+            let noise = nearest_quantile(&block_noise(series, block.max(16)), QUIET_SHARE);
             let flicker_rad_s = FLICKER_STEPS * resolution(series);
             let threshold = (peak * noise + flicker_rad_s).max(creep_rad_s);
             for (moves, v) in moves.iter_mut().zip(series) {

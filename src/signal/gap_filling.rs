@@ -10,7 +10,8 @@ use std::f64::consts::SQRT_2;
 
 use super::error::SignalError;
 use super::instants::{Instants, linear_at};
-use super::period::{find_period, variance_of};
+use super::period::variance_of;
+use super::period_search::find_period;
 use super::resample::{Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
 use crate::median::robust_sigma;
 use crate::robot::JointSignals;

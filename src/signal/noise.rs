@@ -24,9 +24,3 @@ pub(super) fn block_noise(y: &[f64], block: usize) -> Vec<f64> {
 fn sixth_difference(window: &[f64]) -> f64 {
     window.iter().zip(SIXTH).map(|(v, c)| v * c).sum()
 }
-
-/// Value at `share` (0…1) of an ascending list; zero for an empty one.
-pub(super) fn quantile(ascending: &[f64], share: f64) -> f64 {
-    let last = ascending.len().saturating_sub(1);
-    ascending.get((share * last as f64).round() as usize).copied().unwrap_or(0.0)
-}

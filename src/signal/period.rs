@@ -1,41 +1,31 @@
-//! Finds whether a motion repeats, how long its period is, and which part of the log consists of whole periods; there
-//! is nothing to set.
+//! The period of a motion: the part of a log that repeats after a lag of some samples, and the length of the period,
+//! refined to fractions of a sample. What counts as repeated follows from the log.
 //!
-//! 1. Candidates: lags L at which the mean square difference d(L) = ⟨|q(k + L) − q(k)|²⟩, summed over joints and
-//!    computed by FFT, has a local minimum below a quarter of the value for unrelated positions (2 × variance).
-//! 2. At each candidate the difference is judged block by block. A block repeats if its mean square is below what
-//!    noise, half a sample of slip and one percent of the motion's amplitude allow. The longest run of such blocks is
-//!    the repeated part; run-in and rest fall outside it.
-//! 3. The run is cut again where a block exceeds four times the upper quartile of the run's own blocks, so that the
+//! 1. The difference |q(k + L) − q(k)|² after the lag L is judged block by block. A block repeats if its mean square is
+//!    below what noise, half a sample of slip and one percent of the motion's amplitude allow. The longest run of such
+//!    blocks is the repeated part; run-in and rest fall outside it.
+//! 2. The run is cut again where a block exceeds four times the upper quartile of the run's own blocks, so that the
 //!    limit follows from the noise of this log. If a period is no whole number of samples, half a sample of slip is far
 //!    above that noise in the few blocks of a fast move, and nothing in those of a pause. The run is therefore also cut
 //!    with the slip taken out, and that run counts where it is longer by a period.
-//! 4. Among the candidates that cover two or more periods, the one that covers most wins, and the shortest among
-//!    equals, so that a period is preferred to its multiples.
-//! 5. The period is refined by the interpolated lag between the first period and the last.
+//! 3. The period is refined by the interpolated lag between the first period and the last.
 
 use std::ops::Range;
 
-use fourier::{Complex64, Forward, Inverse};
-
-use super::error::{SignalError, enough};
-use super::noise::{block_noise, quantile};
+use super::noise::block_noise;
 use super::slip::{add_squares_without_slip, slip};
-use crate::median::median;
+use crate::cumulative_sum::accumulate;
+use crate::median::{median, nearest_quantile};
 use crate::robot::JointSignals;
 
-/// A longer log is thinned to about this many samples for the search for candidates.
-const SEARCH_SAMPLES: usize = 16384;
-/// Shortest period that is searched for, in samples of the (thinned) log.
-const SHORTEST_PERIOD: usize = 16;
-/// Largest mean square difference of a candidate, relative to that of unrelated positions.
-const CANDIDATE_SHARE: f64 = 0.25;
 /// Deviation between periods that still counts as repetition, relative to the motion's rms amplitude.
 const REPEATS_WITHIN: f64 = 0.01;
 /// Ratio of mean squares that separates blocks that repeat from blocks that do not.
 const BLOCK_RATIO: f64 = 4.0;
 /// Blocks per period.
 const BLOCKS: usize = 64;
+/// A stretch in which the angles vary by less than this share of their variance along the log is mostly rest.
+const MOVING_SHARE: f64 = 0.25;
 /// Number of samples over which the ends of the repeated part are judged.
 const EDGE_SAMPLES: usize = 4;
 /// Slip over the whole log that always counts as none, in samples.
@@ -60,139 +50,8 @@ pub struct Period {
     pub window: Range<usize>,
 }
 
-/// Transform plans and working memory of the search, reused from log to log.
-#[derive(Default)]
-pub struct PeriodSearch {
-    plans: Option<Plans>,
-    time: Vec<f64>,
-    spectrum: Vec<Complex64>,
-    power: Vec<Complex64>,
-    /// Σ q² before each sample of the thinned log, over all joints.
-    energy: Vec<f64>,
-    /// Σ |q(k + L) − q(k)|² before each k.
-    sums: Vec<f64>,
-}
-
-/// Transforms of one length.
-struct Plans {
-    length: usize,
-    forward: Forward,
-    inverse: Inverse,
-}
-
-/// [`PeriodSearch::find`] for a single log.
-pub fn find_period(q_rad: &JointSignals) -> Result<Option<Period>, SignalError> {
-    PeriodSearch::default().find(q_rad)
-}
-
-/// A candidate lag and its uncertainty, in samples.
-#[derive(Debug, Clone, Copy)]
-struct Candidate {
-    samples: usize,
-    uncertainty: usize,
-}
-
-impl PeriodSearch {
-    /// The period of the motion `q_rad` (joints × samples), or `None` if no stretch of two periods or
-    /// more repeats. The log may have run-in, run-out and standstill around it.
-    ///
-    /// Errors: fewer than 64 samples, a value that is not finite.
-    pub fn find(&mut self, q_rad: &JointSignals) -> Result<Option<Period>, SignalError> {
-        enough("the search for a period", q_rad.samples(), 4 * SHORTEST_PERIOD)?;
-        for joint in 0..q_rad.joints() {
-            if let Some(sample) = q_rad.joint(joint).iter().position(|v| !v.is_finite()) {
-                let value = q_rad.joint(joint)[sample];
-                return Err(SignalError::NotFinite { what: "angle", joint, sample, value });
-            }
-        }
-        let record = Record::new(q_rad);
-        // A log without a step is at rest. Its variance need not be zero: the mean is rounded.
-        if record.step_square <= 0.0 {
-            return Ok(None);
-        }
-        let mut best: Option<Period> = None;
-        for candidate in self.candidates(q_rad) {
-            // To replace the best, a candidate must cover more by over one of its own periods, which no multiple of the
-            // best period can.
-            let needed =
-                |period: usize| best.as_ref().map_or(0, |b: &Period| b.window.len() + period);
-            if needed(candidate.samples - candidate.uncertainty) >= q_rad.samples() {
-                continue;
-            }
-            let lag = record.sharpen(candidate);
-            let Some(found) = record.repeats_at(lag, &mut self.sums) else { continue };
-            if found.window.len() > needed(found.samples) {
-                best = Some(found);
-            }
-        }
-        Ok(best)
-    }
-
-    /// Step 1, on a log thinned by averaging neighbouring samples.
-    fn candidates(&mut self, q_rad: &JointSignals) -> Vec<Candidate> {
-        let thin = q_rad.samples().div_ceil(SEARCH_SAMPLES);
-        let n = q_rad.samples() / thin;
-        let longest = n / 2;
-        // Long enough that the circular correlation does not wrap around at any lag in use.
-        let length = (n + longest + 1).next_power_of_two();
-        let plans = match self.plans.take().filter(|plans| plans.length == length) {
-            Some(plans) => plans,
-            None => Plans::new(length),
-        };
-        let Self { time, spectrum, power, energy, .. } = self;
-        time.resize(length, 0.0);
-        spectrum.resize(length / 2 + 1, Complex64::ZERO);
-        power.clear();
-        power.resize(length / 2 + 1, Complex64::ZERO);
-        energy.clear();
-        energy.resize(n + 1, 0.0);
-        for j in 0..q_rad.joints() {
-            let series = q_rad.joint(j);
-            let mean = series.iter().sum::<f64>() / series.len() as f64;
-            time.fill(0.0);
-            for (t, part) in time.iter_mut().zip(series.chunks_exact(thin)).take(n) {
-                *t = part.iter().sum::<f64>() / thin as f64 - mean;
-            }
-            for (energy, t) in energy[1..].iter_mut().zip(time.iter()) {
-                *energy += t * t;
-            }
-            plans.forward.process(time, spectrum).expect("buffers have the plan's length");
-            for (p, c) in power.iter_mut().zip(spectrum.iter()) {
-                p.re += c.norm_sqr();
-            }
-        }
-        for k in 1..=n {
-            energy[k] += energy[k - 1];
-        }
-        plans.inverse.process(power, time).expect("buffers fit and the ends are real");
-        self.plans = Some(plans);
-        let correlation = |lag: usize| time[lag] / length as f64;
-        let difference = |lag: usize| {
-            let both = energy[n - lag] + energy[n] - energy[lag];
-            (both - 2.0 * correlation(lag)) / (n - lag) as f64
-        };
-        let unrelated = 2.0 * energy[n] / n as f64;
-        (SHORTEST_PERIOD..=longest)
-            .filter(|&lag| {
-                let d = difference(lag);
-                d < CANDIDATE_SHARE * unrelated
-                    && d <= difference(lag - 1)
-                    && d <= difference(lag + 1)
-            })
-            .map(|lag| Candidate { samples: lag * thin, uncertainty: thin })
-            .collect()
-    }
-}
-
-impl Plans {
-    fn new(length: usize) -> Self {
-        let (forward, inverse) = (fourier::forward(length), fourier::inverse(length));
-        Self { length, forward, inverse }
-    }
-}
-
-/// The log and the tolerances derived from it.
-struct Record<'a> {
+/// The angles of a log and the tolerances derived from them.
+pub(super) struct Record<'a> {
     q_rad: &'a JointSignals,
     /// Variance of q, summed over joints, rad².
     variance: f64,
@@ -205,7 +64,7 @@ struct Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    fn new(q_rad: &'a JointSignals) -> Self {
+    pub(super) fn new(q_rad: &'a JointSignals) -> Self {
         let n = q_rad.samples() as f64;
         let (mut variance, mut step_square, mut noise) = (0.0, 0.0, 0.0);
         let mut steps = vec![0.0; q_rad.samples()];
@@ -216,12 +75,17 @@ impl<'a> Record<'a> {
             }
             variance += variance_of(q);
             step_square += q.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (n - 1.0);
-            noise += quantile(&block_noise(q, 32), 0.5).powi(2);
+            noise += nearest_quantile(&block_noise(q, 32), 0.5).powi(2);
         }
         let amplitude = REPEATS_WITHIN.powi(2) * variance;
         let tolerance = BLOCK_RATIO * (2.0 * noise + 0.25 * step_square + amplitude);
         accumulate(&mut steps);
         Self { q_rad, variance, step_square, steps, tolerance }
+    }
+
+    /// Whether no angle ever changes. The variance of such a log need not be zero: its mean is rounded.
+    pub(super) fn is_at_rest(&self) -> bool {
+        self.step_square <= 0.0
     }
 
     /// Mean of |q(k + lag) − q(k)|², summed over joints, over the samples k = from, from + every, … of `range`.
@@ -258,35 +122,18 @@ impl<'a> Record<'a> {
         accumulate(sums);
     }
 
-    /// The lag near `candidate` at which most of the log repeats best: the one with the smallest median of block means,
-    /// over the blocks in which the arm is at least as fast as on average. Where it rests, no lag is better than others.
-    fn sharpen(&self, candidate: Candidate) -> usize {
-        let Candidate { samples, uncertainty } = candidate;
-        let cost = |lag: usize| {
-            let all = || blocks(self.q_rad.samples() - lag, lag / BLOCKS);
-            let mean = |block: Range<usize>| self.difference(&block, lag, uncertainty);
-            let mut means: Vec<f64> = all().filter(|block| self.is_fast(block)).map(mean).collect();
-            if means.is_empty() {
-                means = all().map(mean).collect();
-            }
-            let middle = means.len() / 2;
-            *means.select_nth_unstable_by(middle, f64::total_cmp).1
-        };
-        let longest = self.q_rad.samples() / 2;
-        let mut best = (samples, cost(samples));
-        // Run-in and rest bias the candidate, so the search continues as long as it improves.
-        loop {
-            let lowest = best.0.saturating_sub(uncertainty).max(SHORTEST_PERIOD);
-            let highest = (best.0 + uncertainty).min(longest);
-            let Some(next) = (lowest..=highest)
-                .map(|lag| (lag, cost(lag)))
-                .min_by(|a, b| a.1.total_cmp(&b.1))
-                .filter(|next| next.1 < best.1)
-            else {
-                return best.0;
-            };
-            best = next;
+    /// How much positions differ after `lag` samples: the median of block means of the square, rad², over the blocks in
+    /// which the arm is at least as fast as on average. Where it rests, no lag is better than others. Each mean is over
+    /// every `every`-th sample of its block.
+    pub(super) fn difference_of_fast(&self, lag: usize, every: usize) -> f64 {
+        let all = || blocks(self.q_rad.samples() - lag, lag / BLOCKS);
+        let mean = |block: Range<usize>| self.difference(&block, lag, every);
+        let mut means: Vec<f64> = all().filter(|block| self.is_fast(block)).map(mean).collect();
+        if means.is_empty() {
+            means = all().map(mean).collect();
         }
+        let middle = means.len() / 2;
+        *means.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
     /// Whether the arm is at least as fast in the samples `block` as on average.
@@ -295,8 +142,9 @@ impl<'a> Record<'a> {
         square >= self.step_square * block.len() as f64
     }
 
-    /// Steps 2, 3 and 5 for one lag.
-    fn repeats_at(&self, lag: usize, sums: &mut Vec<f64>) -> Option<Period> {
+    /// The period of about `lag` samples in the longest run that repeats after as many; `None` if no stretch of two
+    /// periods or more does. `sums` is working memory.
+    pub(super) fn repeats_at(&self, lag: usize, sums: &mut Vec<f64>) -> Option<Period> {
         let pairs = self.q_rad.samples() - lag;
         self.sum_differences(lag, sums);
         let mean = |r: &Range<usize>| (sums[r.end] - sums[r.start]) / r.len() as f64;
@@ -352,8 +200,8 @@ impl<'a> Record<'a> {
         median(&mut levels).unwrap_or(0.0)
     }
 
-    /// Step 3: the longest run among neighbouring `blocks` that is below the limit which follows from these blocks, and
-    /// the samples beside it that are as well.
+    /// The longest run among neighbouring `blocks` that is below the limit which follows from these blocks, and the
+    /// samples beside it that are as well.
     fn own_run(&self, blocks: &[Range<usize>], lag: usize, sums: &[f64]) -> Option<Range<usize>> {
         let mean = |r: &Range<usize>| (sums[r.end] - sums[r.start]) / r.len() as f64;
         let blocks: Vec<(Range<usize>, f64)> =
@@ -361,7 +209,7 @@ impl<'a> Record<'a> {
         let mut levels: Vec<f64> = blocks.iter().map(|(_, m)| *m).collect();
         levels.sort_by(f64::total_cmp);
         let rounding = 1e-10 * self.variance;
-        let own = (BLOCK_RATIO * quantile(&levels, 0.75)).max(rounding);
+        let own = (BLOCK_RATIO * nearest_quantile(&levels, 0.75)).max(rounding);
         Some(widened(self.longest_run(&blocks, own, lag)?, own, sums))
     }
 
@@ -386,7 +234,7 @@ impl<'a> Record<'a> {
         let variance: f64 = (0..self.q_rad.joints())
             .map(|j| variance_of(&self.q_rad.joint(j)[stretch.clone()]))
             .sum();
-        variance > CANDIDATE_SHARE * self.variance
+        variance > MOVING_SHARE * self.variance
     }
 
     /// Refines the period from the shift that maps the first period of `window` onto its last; returns it with the mean
@@ -435,13 +283,6 @@ impl<'a> Record<'a> {
     }
 }
 
-/// Turns values into the sums up to them.
-fn accumulate(sums: &mut [f64]) {
-    for k in 1..sums.len() {
-        sums[k] += sums[k - 1];
-    }
-}
-
 /// Extends the run sample by sample at both ends, as long as the mean over the next [`EDGE_SAMPLES`] stays below
 /// `limit`: blocks end at arbitrary places, periods do not.
 fn widened(run: Range<usize>, limit: f64, sums: &[f64]) -> Range<usize> {
@@ -476,35 +317,11 @@ pub fn variance_of(y: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::robot::JointSignals;
+    use crate::signal::find_period;
+    use crate::signal::repeated_motions::{minimum_jerk, moves_with_pauses, smooth_periods};
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
-    use std::f64::consts::PI;
-
-    /// Six joints, five harmonics of the period, in samples; a smooth run-in over `run_in`
-    /// samples from rest, `rest` samples of standstill before and after.
-    fn log(
-        period: f64,
-        periods: f64,
-        run_in: usize,
-        rest: usize,
-        sigma: f64,
-        seed: u64,
-    ) -> JointSignals {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let n = 2 * rest + run_in + (period * periods).round() as usize;
-        JointSignals::from_fn(6, n, |j, k| {
-            let k = k.clamp(rest, n - 1 - rest) - rest;
-            let ramp =
-                if k >= run_in { 1.0 } else { 0.5 - 0.5 * (PI * k as f64 / run_in as f64).cos() };
-            let phase = 2.0 * PI * (k as f64 - run_in as f64) / period;
-            let q: f64 = (1..=5)
-                .map(|h| (h as f64 * phase + (j * j + 3 * h * j) as f64).sin() / h as f64)
-                .sum();
-            let noise: f64 = StandardNormal.sample(&mut rng);
-            ramp * q + sigma * noise
-        })
-    }
 
     #[test]
     fn whole_periods_are_found_behind_a_run_in_and_between_rests() {
@@ -515,7 +332,7 @@ mod tests {
             (0.0, 600, 100, 4),
             (1e-3, 50, 0, 5),
         ] {
-            let q = log(1250.0, 8.0, run_in, rest, sigma, seed);
+            let q = smooth_periods(1250.0, 8.0, run_in, rest, sigma, seed);
             let found = find_period(&q).unwrap().expect("eight periods are there");
             assert_eq!((found.samples, found.is_whole), (1250, true), "{found:?}");
             assert_eq!(found.window.len(), found.samples * found.periods);
@@ -533,82 +350,37 @@ mod tests {
     #[test]
     fn many_short_periods_show_what_each_is_off() {
         for (period, whole) in [(99.6, false), (124.7, false), (100.0, true)] {
-            let found = find_period(&log(period, 200.0, 0, 0, 2e-5, 6)).unwrap().expect("periods");
+            let found = find_period(&smooth_periods(period, 200.0, 0, 0, 2e-5, 6))
+                .unwrap()
+                .expect("periods");
             assert_eq!(found.is_whole, whole, "{found:?}");
             assert!((found.refined_samples - period).abs() < 1e-3, "{found:?}");
         }
     }
 
     #[test]
-    fn two_periods_are_enough_and_one_is_not() {
-        let two = find_period(&log(2500.0, 2.3, 500, 0, 2e-5, 7)).unwrap().expect("two periods");
-        assert_eq!((two.samples, two.periods, two.is_whole), (2500, 2, true));
-        assert_eq!(find_period(&log(2500.0, 1.6, 500, 200, 2e-5, 8)).unwrap(), None);
-        assert_eq!(find_period(&log(5000.0, 1.0, 300, 300, 2e-5, 9)).unwrap(), None);
-    }
-
-    #[test]
     fn a_period_between_samples_is_reported_as_such() {
-        let found = find_period(&log(1000.3, 6.0, 200, 0, 2e-5, 10)).unwrap().expect("periodic");
+        let found =
+            find_period(&smooth_periods(1000.3, 6.0, 200, 0, 2e-5, 10)).unwrap().expect("periodic");
         assert_eq!((found.samples, found.is_whole), (1000, false), "{found:?}");
         assert!((found.refined_samples - 1000.3).abs() < 0.01, "{found:?}");
     }
 
-    /// Cycles of three moves of six joints to fixed places and one back, with pauses for half of the time or three
-    /// quarters. The slip, by a part of a sample, is far above the noise in every move.
+    /// Cycles of moves of six joints with pauses for half of the time or three quarters. The slip, by a part of a
+    /// sample, is far above the noise in every move.
     #[test]
     fn cycles_with_pauses_are_found_between_samples() {
-        const MOVES: usize = 4;
-        let way = |j: usize, m: usize| ((j + 1) as f64 * (m + 2) as f64).sin();
-        let step = |j: usize, m: usize| match m {
-            3 => -(0..3).map(|m| way(j, m)).sum::<f64>(),
-            _ => way(j, m),
-        };
         let cycles = [(1371.25, 1371, false), (2742.4, 2742, false), (1371.0, 1371, true)];
         let each = cycles.into_iter().flat_map(|cycle| [(cycle, 0.12), (cycle, 0.06)]);
         for ((period, samples, whole), moving) in each {
             let mut rng = ChaCha8Rng::seed_from_u64(13);
             let q = JointSignals::from_fn(6, (6.2 * period) as usize, |j, k| {
-                let phase = (k as f64 / period).fract();
-                let moved = |m: usize| {
-                    let s = ((phase - m as f64 / MOVES as f64) / moving).clamp(0.0, 1.0);
-                    step(j, m) * s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s)
-                };
                 let noise: f64 = StandardNormal.sample(&mut rng);
-                (0..MOVES).map(moved).sum::<f64>() + 2e-5 * noise
+                moves_with_pauses(j, k as f64 / period, moving, minimum_jerk) + 2e-5 * noise
             });
             let found = find_period(&q).unwrap().expect("six cycles");
             assert_eq!((found.samples, found.is_whole, found.periods), (samples, whole, 6));
             assert!((found.refined_samples - period).abs() < 1e-3, "{found:?}");
         }
-    }
-
-    #[test]
-    fn rest_and_noise_are_not_periodic() {
-        // Means of whole numbers are exact, those of tenths are not.
-        for apart_rad in [1.0, 0.1] {
-            let still = JointSignals::from_fn(6, 4000, |j, _| apart_rad * j as f64);
-            assert_eq!(find_period(&still).unwrap(), None);
-        }
-        let mut rng = ChaCha8Rng::seed_from_u64(11);
-        let noise = JointSignals::from_fn(6, 4000, |_, _| StandardNormal.sample(&mut rng));
-        assert_eq!(find_period(&noise).unwrap(), None);
-        let mut wandering = JointSignals::zeros(6, 6000);
-        for j in 0..6 {
-            let mut q = 0.0;
-            for value in wandering.joint_mut(j) {
-                let step: f64 = StandardNormal.sample(&mut rng);
-                q += 0.01 * step;
-                *value = q;
-            }
-        }
-        assert_eq!(find_period(&wandering).unwrap(), None);
-    }
-
-    #[test]
-    fn a_long_log_is_searched_thinned_and_found_to_the_sample() {
-        let q = log(5003.0, 12.0, 1000, 0, 2e-5, 12);
-        let found = find_period(&q).unwrap().expect("twelve periods");
-        assert_eq!((found.samples, found.periods, found.is_whole), (5003, 12, true), "{found:?}");
     }
 }

@@ -6,8 +6,9 @@ use std::ops::Range;
 use super::resample::bridged_gap_s;
 use crate::median::median_step;
 
-/// How far a joint may turn between two rows beyond what its speed explains, rad; as when rows of a log are read.
-const TORN_RAD: f64 = 0.05;
+/// A joint that is farther than this from where its speed can have led belongs to another recording, rad. When a log is
+/// read, rows may be off by as much.
+const OTHER_RECORDING_RAD: f64 = 0.05;
 /// Acceleration up to which a motion is plausible over a step, rad/s²; arms stay below about 20.
 const ACCELERATION_RAD_S2: f64 = 20.0;
 /// A recorder that hangs loses up to this time without its clock showing it, s. The motion then goes on.
@@ -101,7 +102,7 @@ fn comes_back(time_s: &[f64], joints: &[impl AsRef<[f64]>], first: usize, last: 
     let goes_on = |q: &[f64]| {
         let speed_rad_s = |k: usize| (q[k] - q[k - 1]).abs() / (time_s[k] - time_s[k - 1]);
         let fastest_rad_s = speed_rad_s(first - 1).max(speed_rad_s(last + 1));
-        (q[last] - q[first - 1]).abs() <= TORN_RAD + fastest_rad_s * passed_s
+        (q[last] - q[first - 1]).abs() <= OTHER_RECORDING_RAD + fastest_rad_s * passed_s
     };
     passed_s <= LOST_S && joints.iter().all(|q| goes_on(q.as_ref()))
 }
@@ -109,7 +110,7 @@ fn comes_back(time_s: &[f64], joints: &[impl AsRef<[f64]>], first: usize, last: 
 /// Whether the angle `q` jumps from row `k` − 1 to row `k`.
 fn is_torn(time_s: &[f64], q: &[f64], k: usize) -> bool {
     let way_rad = |k: usize| (q[k] - q[k - 1]).abs();
-    if way_rad(k) <= TORN_RAD {
+    if way_rad(k) <= OTHER_RECORDING_RAD {
         return false;
     }
     let step_s = |k: usize| time_s[k] - time_s[k - 1];
@@ -121,7 +122,7 @@ fn is_torn(time_s: &[f64], q: &[f64], k: usize) -> bool {
     // From rest to rest, an acceleration a carries a joint by a Δt²/4.
     let accelerated_rad = ACCELERATION_RAD_S2 * step_s(k).powi(2) / 4.0;
     let unseen_s = time_s[k] - time_s[hung_since(q, k - 1)] + LOST_S;
-    way_rad(k) > TORN_RAD + accelerated_rad + speed_rad_s * unseen_s
+    way_rad(k) > OTHER_RECORDING_RAD + accelerated_rad + speed_rad_s * unseen_s
 }
 
 /// The first of the rows up to `k` that all have the reading of row `k`.

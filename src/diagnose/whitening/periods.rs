@@ -81,6 +81,7 @@ impl PeriodWhitening {
         let mut problem = Cow::Borrowed(&regression.problem);
         for held in &scene.held_at_rest {
             held.leave_out(problem.to_mut());
+            held.spread_scatter(problem.to_mut());
         }
         let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());
         let forward = fourier::forward(n);
