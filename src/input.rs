@@ -14,9 +14,20 @@ pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
     })
 }
 
+/// `text` without the byte order mark that some editors and spreadsheets put in front.
+pub fn without_mark(text: &str) -> &str {
+    text.trim_start_matches('\u{feff}')
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mark_counts_in_front_alone() {
+        assert_eq!(without_mark("\u{feff}a\u{feff}"), "a\u{feff}");
+        assert_eq!(without_mark("a"), "a");
+    }
 
     #[test]
     fn a_text_in_another_encoding_is_to_be_saved_again() {

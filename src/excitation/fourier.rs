@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{ExcitationError, positive};
 use super::reference::Reference;
-use crate::input::read_text;
+use crate::input::{read_text, without_mark};
 use crate::robot::JointSignals;
 
 /// Schema of trajectory files.
@@ -158,8 +158,7 @@ impl FourierSeries {
 
     /// Parses the text of a trajectory file; `source` names it in messages.
     pub fn from_json(text: &str, source: &str) -> Result<Self, ExcitationError> {
-        // Some editors put a byte order mark in front.
-        let text = text.trim_start_matches('\u{feff}');
+        let text = without_mark(text);
         let json = |e: serde_json::Error| ExcitationError::Json {
             file: source.to_owned(),
             message: e.to_string(),

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use super::export::columns;
 use crate::dynamics::Motion;
+use crate::input::without_mark;
 use crate::robot::JointSignals;
 
 /// Longest header that is read, bytes: enough for a thousand joints.
@@ -94,8 +95,7 @@ impl PlannedMotion {
         let mut header = Vec::new();
         source.by_ref().take(HEADER_LIMIT).read_until(b'\n', &mut header).map_err(fault)?;
         let header = String::from_utf8_lossy(&header);
-        let names: Vec<&str> =
-            header.trim_start_matches('\u{feff}').split(',').map(str::trim).collect();
+        let names: Vec<&str> = without_mark(&header).split(',').map(str::trim).collect();
         let found = names.len() / 3;
         if found == 0 || names != columns(found) {
             return Ok(None);

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use thiserror::Error;
 
-use crate::input::read_text;
+use crate::input::{read_text, without_mark};
 
 /// A file that is not a document of the expected schema.
 #[derive(Debug, Error)]
@@ -48,8 +48,7 @@ struct Head {
 pub fn load<T: DeserializeOwned>(path: &Path, schema: &'static str) -> Result<T, SavedError> {
     let read = || -> Result<T, SavedFault> {
         let text = read_text(path)?;
-        // Some editors put a byte order mark in front.
-        let text = text.trim_start_matches('\u{feff}');
+        let text = without_mark(&text);
         let Head { schema: found } = serde_json::from_str(text)?;
         if found != schema {
             return Err(SavedFault::OtherSchema { found, expected: schema });

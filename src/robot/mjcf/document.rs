@@ -7,7 +7,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::element::Element;
 use super::fault::MjcfFault;
-use crate::input::read_text;
+use crate::input::{read_text, without_mark};
 
 /// Largest nesting depth of elements: no arm needs more, and the stack can hold it.
 const DEEPEST: usize = 200;
@@ -31,7 +31,7 @@ pub(super) fn document(text: &str, source: &str) -> Result<(Element, Vec<PathBuf
 fn parsed(text: &str) -> Result<Document<'_>, roxmltree::Error> {
     // Like MuJoCo, this skips a document type declaration.
     let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
-    Document::parse_with_options(text.trim_start_matches('\u{feff}'), options)
+    Document::parse_with_options(without_mark(text), options)
 }
 
 fn folder(file: &Path) -> PathBuf {
@@ -55,7 +55,7 @@ struct File<'t> {
 
 impl<'t> File<'t> {
     fn new(text: &'t str, name: Option<Rc<str>>, folder: PathBuf) -> Self {
-        let text = text.trim_start_matches('\u{feff}');
+        let text = without_mark(text);
         let ends = text.match_indices('\n').map(|(at, _)| at).collect();
         Self { text, ends, name, folder }
     }

@@ -16,6 +16,7 @@ use super::remarks::Remarks;
 use super::tree::Tree;
 use super::unreadable;
 use super::words::unless_empty;
+use crate::input::without_mark;
 use crate::robot::arm::{Arm, Clearance, Joint, LinkBounds, Placement};
 use crate::robot::error::RobotError;
 use crate::robot::file::{default_epsilon, usual_gravity};
@@ -71,7 +72,7 @@ pub fn read_urdf_up_to(text: &str, source: &str, last_link: &str) -> Result<Urdf
 }
 
 fn read(text: &str, source: &str, last_link: Option<&str>) -> Result<UrdfArm, RobotError> {
-    let text = text.trim_start_matches('\u{feff}');
+    let text = without_mark(text);
     let robot = robot(text).map_err(|message| RobotError::Urdf {
         file: source.to_owned(),
         message: unreadable::reason(text, &message),
