@@ -2,6 +2,7 @@
 //! `cargo test val_` runs the tests against independent references, `regress_` those against pinned results, `blind_`
 //! hide and find.
 
+mod blind;
 mod cli;
 mod damage;
 mod golden;
@@ -12,6 +13,7 @@ mod simulated;
 mod blind_benchmark;
 mod blind_changes;
 mod blind_families;
+mod blind_friction;
 mod blind_moves;
 mod blind_records;
 mod blind_single_runs;
@@ -22,6 +24,7 @@ mod cli_identify;
 mod cli_montecarlo;
 mod cli_physical;
 mod cli_predict;
+mod cli_refusals;
 mod cli_study;
 mod cli_urdf;
 mod cycles_between_samples;

@@ -36,10 +36,10 @@ pub fn smooth_periods(
 /// passed since the first began, and each move takes the share `moving` of a cycle.
 pub fn moves_with_pauses(j: usize, cycles: f64, moving: f64, progress: impl Fn(f64) -> f64) -> f64 {
     const MOVES: usize = 4;
-    let there = |j: usize, m: usize| ((j + 1) as f64 * (m + 2) as f64).sin();
+    let there = |m: usize| ((j + 1) as f64 * (m + 2) as f64).sin();
     let way = |m: usize| match m + 1 {
-        MOVES => -(0..m).map(|m| there(j, m)).sum::<f64>(),
-        _ => there(j, m),
+        MOVES => -(0..m).map(there).sum::<f64>(),
+        _ => there(m),
     };
     let phase = cycles.fract();
     let passed = |m: usize| ((phase - m as f64 / MOVES as f64) / moving).clamp(0.0, 1.0);

@@ -1,15 +1,19 @@
 //! The drive file: everything about an arm that a URDF or an MJCF has no place for.
 
 mod clearance;
+mod entry;
+mod rest;
 
 use clearance::Source;
+use entry::DriveEntry;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::robot::file::{BoxEntry, CapsuleEntry};
 use crate::robot::place::Place;
-use crate::robot::urdf::unless_empty;
-use crate::robot::{Arm, Joint, MjcfNotice, RobotError, ShapeNotice, UrdfNotice};
+use crate::robot::{Arm, RobotError};
+
+pub(in crate::robot) use rest::Rest;
 
 /// The drive file beside a URDF or an MJCF. A key that is left out keeps the value of that file, or the value that is
 /// assumed without a drive file.
@@ -33,45 +37,6 @@ pub(in crate::robot) struct DriveFile {
     capsules: Vec<CapsuleEntry>,
     #[serde(default, rename = "box", skip_serializing_if = "Vec::is_empty")]
     boxes: Vec<BoxEntry>,
-}
-
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DriveEntry {
-    name: String,
-    rotor_inertia_kg_m2: Option<f64>,
-    viscous_nm_s_rad: Option<f64>,
-    coulomb_nm: Option<f64>,
-    torque_offset_nm: Option<f64>,
-    velocity_rad_s: Option<f64>,
-    acceleration_rad_s2: Option<f64>,
-    torque_nm: Option<f64>,
-    gear_ratio: Option<f64>,
-    torque_constant_nm_a: Option<f64>,
-    mass_bounds_kg: Option<[f64; 2]>,
-    com_bounds_m: Option<[[f64; 2]; 3]>,
-}
-
-/// What a drive file leaves of a notice.
-#[derive(Debug, PartialEq)]
-pub(in crate::robot) enum Rest {
-    /// The file has no say in it.
-    Untouched(UrdfNotice),
-    /// Neither the file nor the model beside it says this.
-    Open(UrdfNotice),
-    /// The file settles it.
-    Nothing,
-}
-
-impl Rest {
-    fn open_if(is_open: bool, notice: UrdfNotice) -> Self {
-        if is_open { Self::Open(notice) } else { Self::Nothing }
-    }
-
-    /// What is left of a notice about the joints or the like that the file does not settle.
-    fn about<T>(left: Vec<T>, notice: impl FnOnce(Vec<T>) -> UrdfNotice) -> Self {
-        unless_empty(left, notice).map_or(Self::Nothing, Self::Open)
-    }
 }
 
 /// The drives and the clearance of `arm` as TOML, to lie beside a URDF that describes the bodies alone. The torque of a
@@ -236,124 +201,9 @@ impl DriveFile {
         }
     }
 
-    /// What this file leaves of a `notice` about the model beside it.
-    pub(in crate::robot) fn rest_of(&self, notice: UrdfNotice) -> Rest {
-        match notice {
-            UrdfNotice::Gravity { .. } | UrdfNotice::Mjcf(MjcfNotice::Weightless) => {
-                Rest::open_if(self.gravity_m_s2.is_none(), notice)
-            }
-            UrdfNotice::FrictionEpsilon { .. } => {
-                Rest::open_if(self.friction_epsilon_rad_s.is_none(), notice)
-            }
-            UrdfNotice::Drives { rotor_inertia, gear_ratio, torque_constant } => {
-                let rotor_inertia = self.without(rotor_inertia, |e| e.rotor_inertia_kg_m2);
-                let gear_ratio = self.without(gear_ratio, |e| e.gear_ratio);
-                let torque_constant = self.without(torque_constant, |e| e.torque_constant_nm_a);
-                let lists = [&rotor_inertia, &gear_ratio, &torque_constant];
-                let is_open = lists.iter().any(|joints| !joints.is_empty());
-                let notice = UrdfNotice::Drives { rotor_inertia, gear_ratio, torque_constant };
-                Rest::open_if(is_open, notice)
-            }
-            UrdfNotice::NoFriction { joints } => {
-                let joints = self.without(joints, |e| e.viscous_nm_s_rad.or(e.coulomb_nm));
-                Rest::about(joints, |joints| UrdfNotice::NoFriction { joints })
-            }
-            UrdfNotice::ServoDamping { mut joints } => {
-                joints.retain(|(joint, ..)| !self.says(joint, |e| e.viscous_nm_s_rad));
-                Rest::about(joints, |joints| UrdfNotice::ServoDamping { joints })
-            }
-            UrdfNotice::AssumedVelocity { joints, velocity_rad_s } => {
-                let joints = self.without(joints, |e| e.velocity_rad_s);
-                Rest::about(joints, |joints| UrdfNotice::AssumedVelocity { joints, velocity_rad_s })
-            }
-            UrdfNotice::NoTorqueLimit { joints } => {
-                let joints = self.without(joints, |e| e.torque_nm);
-                Rest::about(joints, |joints| UrdfNotice::NoTorqueLimit { joints })
-            }
-            UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2 } => {
-                let joints = self.without(joints, |e| e.acceleration_rad_s2);
-                Rest::about(joints, |joints| UrdfNotice::AssumedAcceleration {
-                    joints,
-                    acceleration_rad_s2,
-                })
-            }
-            UrdfNotice::Shapes(_) if self.sets_shapes_aside() => Rest::Nothing,
-            UrdfNotice::Shapes(ShapeNotice::Nothing) if !self.capsules.is_empty() => Rest::Nothing,
-            other => Rest::Untouched(other),
-        }
-    }
-
     /// What the file says about a joint.
     fn entry(&self, joint: &str) -> Option<&DriveEntry> {
         self.joint.iter().find(|entry| entry.name == joint)
-    }
-
-    /// Those of `joints` for which the file does not give a quantity.
-    fn without(
-        &self,
-        joints: Vec<String>,
-        quantity: impl Fn(&DriveEntry) -> Option<f64>,
-    ) -> Vec<String> {
-        joints.into_iter().filter(|joint| !self.says(joint, &quantity)).collect()
-    }
-
-    /// Whether the file gives a quantity of a joint.
-    fn says(&self, joint: &str, quantity: impl Fn(&DriveEntry) -> Option<f64>) -> bool {
-        self.entry(joint).and_then(quantity).is_some()
-    }
-}
-
-impl DriveEntry {
-    fn of(joint: &Joint, torque_offset_nm: f64) -> Self {
-        let Joint { name, drive, limits, bounds, assumed, .. } = joint;
-        Self {
-            name: name.clone(),
-            rotor_inertia_kg_m2: Some(drive.rotor_inertia_kg_m2),
-            viscous_nm_s_rad: Some(drive.viscous_nm_s_rad),
-            coulomb_nm: Some(drive.coulomb_nm),
-            torque_offset_nm: Some(torque_offset_nm),
-            // The URDF beside the drive file has these limits.
-            velocity_rad_s: None,
-            torque_nm: None,
-            acceleration_rad_s2: (!assumed.acceleration).then_some(limits.acceleration_rad_s2),
-            gear_ratio: (!assumed.gear_ratio).then_some(drive.gear_ratio),
-            torque_constant_nm_a: (!assumed.torque_constant).then_some(drive.torque_constant_nm_a),
-            mass_bounds_kg: bounds.mass_kg,
-            com_bounds_m: bounds.com_m,
-        }
-    }
-
-    fn apply(&self, joint: &mut Joint, place: &Place) -> Result<(), RobotError> {
-        let Joint { drive, limits, bounds, assumed, .. } = joint;
-        take(&mut drive.rotor_inertia_kg_m2, self.rotor_inertia_kg_m2, |value| {
-            place.not_negative("rotor_inertia_kg_m2", value)
-        })?;
-        take(&mut drive.viscous_nm_s_rad, self.viscous_nm_s_rad, |value| {
-            place.not_negative("viscous_nm_s_rad", value)
-        })?;
-        take(&mut drive.coulomb_nm, self.coulomb_nm, |value| {
-            place.not_negative("coulomb_nm", value)
-        })?;
-        place.finite("torque_offset_nm", self.torque_offset_nm.as_slice())?;
-        take(&mut drive.gear_ratio, self.gear_ratio, |value| place.positive("gear_ratio", value))?;
-        take(&mut drive.torque_constant_nm_a, self.torque_constant_nm_a, |value| {
-            place.positive("torque_constant_nm_a", value)
-        })?;
-        take(&mut limits.velocity_rad_s, self.velocity_rad_s, |value| {
-            place.positive("velocity_rad_s", value)
-        })?;
-        take(&mut limits.torque_nm, self.torque_nm, |value| place.limit("torque_nm", value))?;
-        take(&mut limits.acceleration_rad_s2, self.acceleration_rad_s2, |value| {
-            place.positive("acceleration_rad_s2", value)
-        })?;
-        let given = place.bounds(self.mass_bounds_kg, self.com_bounds_m)?;
-        bounds.mass_kg = given.mass_kg.or(bounds.mass_kg);
-        bounds.com_m = given.com_m.or(bounds.com_m);
-        assumed.gear_ratio &= self.gear_ratio.is_none();
-        assumed.torque_constant &= self.torque_constant_nm_a.is_none();
-        assumed.velocity &= self.velocity_rad_s.is_none();
-        assumed.acceleration &= self.acceleration_rad_s2.is_none();
-        Ok(())
     }
 }
 
@@ -373,7 +223,7 @@ fn take(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::Clearance;
+    use crate::robot::{Clearance, UrdfNotice};
 
     fn ur5() -> Arm {
         Arm::built_in("ur5").unwrap()
@@ -467,52 +317,5 @@ mod tests {
         let behind = "\n[[joint]]\nname = \"other\"\ngear_ratio = 50.0\n";
         assert_eq!(written, format!("{alone}{behind}"));
         assert!(drive_file_of_urdf(&arm, &[0.5; 6], "joint = 1", "x.drives.toml").is_err());
-    }
-
-    #[test]
-    fn only_what_a_drive_file_says_is_not_assumed_any_more() {
-        let all = || ["a", "b"].map(str::to_owned).to_vec();
-        let b = || vec!["b".to_owned()];
-        let gravity = || UrdfNotice::Gravity { root: "base".into() };
-        let drives = |rotor_inertia, gear_ratio, torque_constant| UrdfNotice::Drives {
-            rotor_inertia,
-            gear_ratio,
-            torque_constant,
-        };
-        let no_friction = |joints| UrdfNotice::NoFriction { joints };
-        let servo = |joint: &str| (joint.to_owned(), 200.0, 150.0);
-        let dampings = |joints| UrdfNotice::ServoDamping { joints };
-        let accelerations =
-            |joints| UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2: 10.0 };
-        let notices = || {
-            let both = dampings(vec![servo("a"), servo("b")]);
-            let accelerations = accelerations(all());
-            [gravity(), drives(all(), all(), all()), no_friction(all()), both, accelerations]
-        };
-        let left = |text: &str| -> Vec<UrdfNotice> {
-            let file = DriveFile::read(text, "x.drives.toml").unwrap();
-            let rest = |notice| match file.rest_of(notice) {
-                Rest::Open(notice) => Some(notice),
-                Rest::Nothing => None,
-                Rest::Untouched(other) => panic!("{other}"),
-            };
-            notices().into_iter().filter_map(rest).collect()
-        };
-        assert_eq!(left("friction_epsilon_rad_s = 0.01"), notices());
-        let one = "[[joint]]\nname = \"a\"\n";
-        let said = left(&format!("{one}viscous_nm_s_rad = 0.0\ntorque_constant_nm_a = 0.1\n"));
-        let of_b = dampings(vec![servo("b")]);
-        let expected =
-            [gravity(), drives(all(), all(), b()), no_friction(b()), of_b, accelerations(all())];
-        assert_eq!(said, expected);
-        let open = said[1].to_string();
-        let of_both = "no rotor inertia and no gear ratio given, taken as 0 and 1: a, b; ";
-        assert!(open.contains(of_both), "{open}");
-        assert!(open.contains("no torque constant given, taken as 1 Nm/A: b"), "{open}");
-        let mut arm = ur5();
-        let names = names(&arm);
-        arm.joints.truncate(2);
-        let text = drive_file(&arm, &[0.0; 2]).replace(&names[0], "a").replace(&names[1], "b");
-        assert!(left(&text).is_empty(), "{text}");
     }
 }
