@@ -100,10 +100,8 @@ impl<'a> Diagnoser<'a> {
         let setup = Setup { arm: self.arm, set: self.set, options: &self.options };
         let explanation =
             Explanation::of(&self.families, setup, &regression, &identification, &log, m.source)?;
-        let Explanation { study, null, .. } = &explanation;
-        let kept = explanation.kept();
-        let selected = kept.selected();
-        let mut model = self.extended(study, &kept, selected, &explanation.gains);
+        let Explanation { study, null, selected, gains, .. } = &explanation;
+        let mut model = self.extended(study, &explanation.kept(), selected.clone(), gains);
         let laws = OnJoint::of(study, &model.selected, &model.extension.effects);
         let touches = touches(&log, study, &model.after_nm)?;
         if let Some(simulation) = simulation {

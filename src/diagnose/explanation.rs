@@ -5,6 +5,7 @@ use super::cleaned::Cleaned;
 use super::contenders::Contender;
 use super::error::DiagnoseError;
 use super::extension::Extension;
+use super::judgement::Selected;
 use super::selection::{Kept, select};
 use super::settled::{as_told, is_told_of_others, settled, without_contacts};
 use super::setup::Setup;
@@ -16,7 +17,9 @@ pub(super) struct Explanation<'a> {
     /// The log along the motion of the arm as it was estimated last.
     pub study: Study<'a>,
     causes: Vec<Contender>,
-    /// What each cause gains on periods that were left out of its fit ([`Kept::drop_idle`]).
+    /// The causes with their alternatives, and what each gains on periods that were left out of its fit
+    /// ([`Kept::likely`]).
+    pub selected: Vec<Selected>,
     pub gains: Vec<Option<f64>>,
     /// The model without causes.
     pub null: Extension,
@@ -40,16 +43,16 @@ impl<'a> Explanation<'a> {
             true => Kept::of(&study, found),
             false => Kept::of_a_single_run(&study, found),
         };
-        let mut gains = kept.drop_idle();
+        let (mut selected, mut gains) = kept.likely();
         let mut causes = kept.causes;
         if study.scene.periodic && is_told_of_others(&study, &causes) {
             causes = as_told(&mut study, causes);
             study.look_everywhere();
             let mut kept = Kept::of(&study, causes);
-            gains = kept.drop_idle();
+            (selected, gains) = kept.likely();
             causes = kept.causes;
         }
-        Ok(Self { study, causes, gains, null })
+        Ok(Self { study, causes, selected, gains, null })
     }
 
     /// The causes that are kept.

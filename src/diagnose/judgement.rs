@@ -28,6 +28,11 @@ pub struct Selected {
 }
 
 impl Selected {
+    /// Whether something else is more likely than the cause and its class: another cause in its place, or none.
+    pub fn is_outdone(&self) -> bool {
+        self.confidence < 0.5
+    }
+
     /// The rivals that the data cannot tell from the cause, at their best shapes.
     pub fn alike(&self) -> Vec<&Entry> {
         let in_class = |rival: &&Contender| self.class.contains(&rival.entry.place());
@@ -45,6 +50,24 @@ pub struct Form {
 }
 
 impl Kept<'_, '_> {
+    /// Drops causes that gain nothing on other periods ([`Self::drop_idle`]), and those of a motion that repeats which
+    /// are [outdone](Selected::is_outdone), the least likely first: as long as something else is more likely, a name
+    /// says nothing, and the law behind it makes the model no better. Returns those that stay, with their alternatives,
+    /// and their gains.
+    pub fn likely(&mut self) -> (Vec<Selected>, Vec<Option<f64>>) {
+        loop {
+            let gains = self.drop_idle();
+            let selected = self.selected();
+            let outdone = selected.iter().enumerate().filter(|(_, cause)| cause.is_outdone());
+            let least = outdone.min_by(|a, b| a.1.confidence.total_cmp(&b.1.confidence));
+            let Some((least, _)) = least.filter(|_| self.study.scene.periodic) else {
+                return (selected, gains);
+            };
+            let site = self.causes.remove(least).entry.site;
+            self.refine_at(site);
+        }
+    }
+
     /// All causes, each with its confidence, class and rivals.
     pub fn selected(&self) -> Vec<Selected> {
         (0..self.causes.len()).map(|c| self.judged(c)).collect()

@@ -1,4 +1,4 @@
-//! Finds friction that is held in the pauses of a motion that repeats, and leaves these rows out of the fit.
+//! Finds friction that is held in the pauses of a motion, and leaves these rows out of the fit.
 //!
 //! The model's friction follows the velocity and is zero at rest. A joint that sticks holds anything between −F and F
 //! there, with F its static friction: the controller pushes, and nothing moves. Taken for friction of zero, what it holds
@@ -11,11 +11,10 @@
 //! model do: these are of one size in moves and pauses, because pauses lie at the ends of moves.
 
 use super::fit::{Fitter, Weighting};
-use super::pauses::{LONG_S, pauses};
+use super::pauses::LONG_S;
 use super::problem::Problem;
 use crate::base::BaseSet;
 use crate::dynamics::Parameter;
-use crate::robot::JointSignals;
 use crate::signal::{mean_period, rms};
 
 /// Friction that one joint holds in its pauses.
@@ -41,6 +40,9 @@ pub struct HeldAtRest {
 const STANDS_OUT: f64 = 3.0;
 /// Rms of what is held over its scatter between the periods from which on it is no noise.
 const CERTAIN: f64 = 10.0;
+/// Least number of means, in pauses and in motion, that are compared along a single run, which has no scatter between periods.
+/// Two rms values of ten means of noise differ by a factor of 3 in one of 1100 logs.
+const LEAST_STRETCHES: usize = 10;
 /// Smallest friction that is called held, relative to that in motion: a description of friction near rest is not exact.
 const LEAST_HELD: f64 = 0.05;
 /// Largest friction that a joint may hold at rest, relative to its dry friction while it moves: static friction may be
@@ -48,18 +50,17 @@ const LEAST_HELD: f64 = 0.05;
 pub const MOST_HELD: f64 = 1.5;
 
 impl HeldAtRest {
-    /// Joints that hold friction in their pauses or may do so, along the motion of `problem` with the velocities `qd_rad_s` of one
-    /// period; ε is `epsilon_rad_s`. `ready` leaves the rows of pauses out of a problem and makes it ready for a fit.
+    /// Joints that hold friction in their pauses or may do so, along the motion of `problem`; `pauses_of` has the rows of
+    /// each pause of a joint. `ready` leaves the rows of pauses out of a problem and makes it ready for a fit.
     pub(super) fn of(
         problem: &Problem,
         set: &BaseSet,
-        qd_rad_s: &JointSignals,
-        epsilon_rad_s: f64,
+        pauses_of: impl Fn(usize) -> Vec<Vec<usize>>,
         ready: impl FnOnce(&mut Problem, &[Self]),
     ) -> Vec<Self> {
         let n = problem.samples;
         let of_joint = |joint: usize| {
-            let pauses = pauses(qd_rad_s, joint, problem.rate_hz, epsilon_rad_s);
+            let pauses = pauses_of(joint);
             let rows: usize = pauses.iter().map(Vec::len).sum();
             let share = rows as f64 / n as f64;
             (rows > 0).then_some(Self { log: 0, joint, held_nm: 0.0, pauses, share, sticks: false })
@@ -106,16 +107,21 @@ impl HeldAtRest {
         problem: &Problem,
     ) -> Option<Self> {
         let (n, y) = (problem.samples, &problem.panels[self.joint].y);
-        if rms(&self.levels(left_nm)) < CERTAIN * rms(&self.errors_of_levels(y, n)) {
+        let length = (LONG_S * problem.rate_hz).ceil() as usize;
+        let means = |runs: &[Vec<usize>]| -> Vec<f64> {
+            let stretches = runs.iter().flat_map(|run| run.chunks_exact(length));
+            stretches.map(|at| mean_at(left_nm, at)).collect()
+        };
+        let [in_pauses, in_motion] = [&self.pauses, &self.runs_between(n)].map(|runs| means(runs));
+        let is_certain = if problem.periods > 1 {
+            rms(&self.levels(left_nm)) >= CERTAIN * rms(&self.errors_of_levels(y, n))
+        } else {
+            in_pauses.len().min(in_motion.len()) >= LEAST_STRETCHES
+        };
+        if !is_certain {
             return None;
         }
-        let length = (LONG_S * problem.rate_hz).ceil() as usize;
-        let rms_of_means = |runs: &[Vec<usize>]| {
-            let stretches = runs.iter().flat_map(|run| run.chunks_exact(length));
-            rms(&stretches.map(|at| mean_at(left_nm, at)).collect::<Vec<f64>>())
-        };
-        let stands_out =
-            rms_of_means(&self.pauses) > STANDS_OUT * rms_of_means(&self.runs_between(n));
+        let stands_out = rms(&in_pauses) > STANDS_OUT * rms(&in_motion);
         let held_nm = rms(&self.levels(frictionless_nm));
         let is_of_friction = (LEAST_HELD..MOST_HELD).contains(&(held_nm / coulomb_nm));
         let sticks = stands_out && is_of_friction;
@@ -183,7 +189,9 @@ fn mean_at(y: &[f64], at: &[usize]) -> f64 {
 mod tests {
     use super::*;
     use crate::base::ColumnPlan;
+    use crate::identify::pauses::pauses;
     use crate::identify::problem::Panel;
+    use crate::robot::JointSignals;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
 
@@ -242,6 +250,32 @@ mod tests {
             // The samples of the moves hold nothing.
             assert!((level - held).abs() < 0.07 * held.abs() + 5.0 * 0.0035, "{levels:?}");
         }
+    }
+
+    /// The scatter of a single run is not known, but the moves between its pauses are. The first two seconds have one pause of
+    /// a second, which is five means of 0.2 s: too few.
+    #[test]
+    fn a_single_run_tells_what_is_held_by_its_moves() {
+        let mut run = problem(|k| [0.0, 2.0, 0.0, -1.0][k / 100]);
+        let all = [paused(), paused()].map(|held| held.pauses);
+        let later = |k: &usize| k + N;
+        let second: Vec<Vec<usize>> =
+            all[1].iter().map(|pause| pause.iter().map(later).collect()).collect();
+        let pauses = [all[0].clone(), second].concat();
+        run.unfold();
+        let told = |samples: usize| {
+            let mut run = run.clone();
+            run.samples = samples;
+            run.panels[0].x.truncate(samples);
+            run.panels[0].y.truncate(samples);
+            let y = &run.panels[0].y;
+            let left: Vec<f64> = (0..samples).map(|k| y[k] - velocity(k % N)).collect();
+            let mut held = HeldAtRest { pauses: pauses.clone(), ..paused() };
+            held.pauses.retain(|pause| pause.iter().all(|k| *k < samples));
+            held.beside(&left, &left, 5.0, &run)
+        };
+        assert!(told(2 * N).expect("something is held").sticks);
+        assert_eq!(told(N / 2), None);
     }
 
     #[test]

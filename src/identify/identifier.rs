@@ -12,6 +12,7 @@ use super::lowered::Lowered;
 use super::measurement::Measurement;
 use super::motion_noise::moved_to_mean;
 use super::options::Options;
+use super::pauses::{pauses, pauses_of_run};
 use super::prepare::Preparer;
 use super::prepared::{Prepared, Processing};
 use super::problem::{Assembler, Problem};
@@ -21,6 +22,7 @@ use super::untorn::Untorn;
 use super::whiten::{SMOOTHER, Spectrum, smoothed};
 use crate::base::{BaseSet, ColumnPlan};
 use crate::dynamics::Model;
+use crate::robot::JointSignals;
 use crate::signal::{FineClock, Replicates, Scratch, ZeroPhase, fill_gaps};
 
 /// Everything that stays the same from log to log, and reusable memory.
@@ -103,9 +105,10 @@ impl<'a> Identifier<'a> {
 
     /// Identifies from one log.
     pub fn identify(&mut self, m: &Measurement) -> Result<Identification, IdentifyError> {
-        let (prepared, ..) = self.fill_from(m, false)?;
+        let (prepared, first, every) = self.fill_from(m, false)?;
         let instruments = self.instruments_for(self.options.estimator, &prepared)?;
-        self.solve(prepared, instruments.as_ref(), m.source)
+        let pauses = self.pauses(&prepared, || self.velocities(&prepared, [first, every]));
+        self.solve(prepared, &pauses, instruments.as_ref(), m.source)
     }
 
     /// Lays out `m`, whose torque is the manufacturer's feed-forward, for regression. `None` where that torque is the
@@ -151,7 +154,34 @@ impl<'a> Identifier<'a> {
     ) -> Result<Identification, IdentifyError> {
         self.problem.clone_from(&regression.problem);
         let Regression { prepared, instruments, log, .. } = regression;
-        self.solve(prepared.clone(), instruments.as_ref(), log)
+        let pauses = self.pauses(prepared, || regression.course().qd_rad_s);
+        self.solve(prepared.clone(), &pauses, instruments.as_ref(), log)
+    }
+
+    /// The rows of each pause of every joint in the problem that was laid out from `prepared`. `velocities` are those of its
+    /// rows, rad/s, which only a single run needs.
+    fn pauses(
+        &self,
+        prepared: &Prepared,
+        velocities: impl FnOnce() -> JointSignals,
+    ) -> Vec<Vec<Vec<usize>>> {
+        let (rate_hz, epsilon_rad_s) = (self.problem.rate_hz, self.model.friction_epsilon_rad_s());
+        let joints = 0..self.problem.joints();
+        if prepared.replicates.is_some() {
+            let qd_rad_s = &prepared.motion.qd_rad_s;
+            return joints.map(|j| pauses(qd_rad_s, j, rate_hz, epsilon_rad_s)).collect();
+        }
+        let (qd_rad_s, cutoff_hz) = (velocities(), self.options.cutoff_hz);
+        let of_joint = |j| pauses_of_run(&qd_rad_s, j, rate_hz, epsilon_rad_s, cutoff_hz);
+        joints.map(of_joint).collect()
+    }
+
+    /// Velocities of the rows of the single run `prepared`, rad/s, from its sample `first` on, each `every` samples.
+    fn velocities(&self, prepared: &Prepared, [first, every]: [usize; 2]) -> JointSignals {
+        let qd_rad_s = &prepared.motion.qd_rad_s;
+        JointSignals::from_fn(qd_rad_s.joints(), self.problem.samples, |j, k| {
+            qd_rad_s.joint(j)[first + k * every]
+        })
     }
 
     fn fill_from(
@@ -279,10 +309,11 @@ impl<'a> Identifier<'a> {
         Ok((kept.start, every))
     }
 
-    /// Solves the problem that was laid out from `prepared`, which comes from `log`.
+    /// Solves the problem that was laid out from `prepared`, which comes from `log`, with these `pauses` of every joint.
     fn solve(
         &mut self,
         mut prepared: Prepared,
+        pauses: &[Vec<Vec<usize>>],
         instruments: Option<&Problem>,
         log: &str,
     ) -> Result<Identification, IdentifyError> {
@@ -325,7 +356,7 @@ impl<'a> Identifier<'a> {
             }
         };
         let drifts = self.take_out_drift(&mut prepared);
-        let (held, may_be_held) = self.held_at_rest(&prepared);
+        let (held, may_be_held) = self.held_at_rest(&prepared, pauses);
         let whole = self.with_answers_out(&prepared, &held);
         let by_harmonics = weighs_harmonics(estimator, &[kind]);
         leave_out(&mut self.problem, &held, by_harmonics);
@@ -394,19 +425,26 @@ impl<'a> Identifier<'a> {
         drifts
     }
 
-    /// Friction that is held in the pauses of the log `prepared`, which knows it or has to be searched for it; and friction
+    /// Friction that is held in the `pauses` of the log `prepared`, which knows it or has to be searched for it; and friction
     /// that may be held.
-    fn held_at_rest(&mut self, prepared: &Prepared) -> (Vec<HeldAtRest>, Vec<HeldAtRest>) {
-        if prepared.replicates.is_none() || !prepared.held_at_rest.is_empty() {
+    fn held_at_rest(
+        &mut self,
+        prepared: &Prepared,
+        pauses: &[Vec<Vec<usize>>],
+    ) -> (Vec<HeldAtRest>, Vec<HeldAtRest>) {
+        if !prepared.held_at_rest.is_empty() {
             return (prepared.held_at_rest.clone(), Vec::new());
         }
         let Self { clock, problem, model, set, .. } = self;
-        let (motion, epsilon_rad_s) = (&prepared.motion, model.friction_epsilon_rad_s());
-        let all =
-            HeldAtRest::of(problem, set, &motion.qd_rad_s, epsilon_rad_s, |moving, pauses| {
-                take_out_drive_answers(moving, clock, model, prepared, pauses);
-                leave_out(moving, pauses, false);
-            });
+        let all = HeldAtRest::of(
+            problem,
+            set,
+            |j| pauses[j].clone(),
+            |moving, held| {
+                take_out_drive_answers(moving, clock, model, prepared, held);
+                leave_out(moving, held, false);
+            },
+        );
         all.into_iter().partition(|held| held.sticks)
     }
 
@@ -450,11 +488,12 @@ impl<'a> Identifier<'a> {
         m: &Measurement,
         methods: &[(Estimator, Vec<CovarianceKind>)],
     ) -> Result<Vec<Result<Estimate, IdentifyError>>, IdentifyError> {
-        let (mut prepared, ..) = self.fill_from(m, false)?;
+        let (mut prepared, first, every) = self.fill_from(m, false)?;
+        let pauses = self.pauses(&prepared, || self.velocities(&prepared, [first, every]));
         let by_instruments = methods.iter().map(|(e, _)| *e).find(|e| *e == Estimator::Iv);
         let instruments = self.instruments_for(by_instruments, &prepared)?;
         self.take_out_drift(&mut prepared);
-        let (held, _) = self.held_at_rest(&prepared);
+        let (held, _) = self.held_at_rest(&prepared, &pauses);
         let whole = self.with_answers_out(&prepared, &held);
         let aids = MotionAids {
             acceleration: prepared.acceleration.as_deref(),

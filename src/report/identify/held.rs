@@ -3,19 +3,19 @@
 use serde::Serialize;
 
 use super::Training;
-use crate::identify::HeldAtRest;
+use crate::identify::{HeldAtRest, Processing};
 use crate::number::significant;
 
 /// Friction that one joint holds in its pauses along a log.
 #[derive(Debug, Clone, Serialize)]
 pub struct HeldResult {
-    /// The log.
-    pub log: String,
+    /// The log; `None` where the rows of several logs are solved as one.
+    pub log: Option<String>,
     /// The joint, from 1.
     pub joint: usize,
     /// Rms, over the pauses, of what is held in each of them on average, Nm.
     pub held_nm: f64,
-    /// Pauses in a period.
+    /// Pauses in a period, or in all single runs.
     pub pauses: usize,
     /// Share of the rows of the joint that were left out for them.
     pub share: f64,
@@ -25,8 +25,10 @@ impl HeldResult {
     /// All of the logs behind `training`. Of a misread log there are none: what seems to be friction there need not be
     /// any.
     pub fn all(training: &Training) -> Vec<Self> {
+        let Processing { logs, periods, .. } = training.identification.processing;
+        let is_stacked = logs > 1 && periods == 1;
         let of = |held: &HeldAtRest| Self {
-            log: training.logs[held.log].source.clone(),
+            log: (!is_stacked).then(|| training.logs[held.log].source.clone()),
             joint: held.joint + 1,
             held_nm: held.held_nm,
             pauses: held.pauses.len(),
@@ -57,7 +59,10 @@ pub(super) fn remarks(training: &Training) -> Vec<String> {
              diagnose says whether something else than friction explains it",
             joints.join(", ")
         );
-        training.named(&held[0].log, remark)
+        match &held[0].log {
+            Some(log) => training.named(log, remark),
+            None => remark,
+        }
     };
     HeldResult::all(training).chunk_by(|a, b| a.log == b.log).map(of_one).collect()
 }
@@ -69,7 +74,7 @@ mod tests {
     #[test]
     fn what_is_held_is_told_with_its_rows() {
         let held = HeldResult {
-            log: "a.csv".to_owned(),
+            log: Some("a.csv".to_owned()),
             joint: 2,
             held_nm: 2.4431,
             pauses: 5,
