@@ -81,6 +81,17 @@ fn every_joint_that_sticks_is_named() {
     }
 }
 
+/// The same log as a single run, of which no row at rest is tested: the joints are told, but not as a cause.
+#[test]
+fn a_single_run_tells_which_joints_stick_and_names_nothing() {
+    let mut run = Run::of(&logs(STICK), 0);
+    run.options.repetition = Repetition::Never;
+    let d = run.diagnoser().diagnose(&run.log.measurement("held"), &[], None).unwrap().diagnosis;
+    assert!(d.causes.is_empty() && d.unexplained.is_none(), "{:#?}", d.sentences);
+    let told = "friction is held in pauses: joint 2 (";
+    assert!(d.warnings.iter().any(|warning| warning.contains(told)), "{:#?}", d.warnings);
+}
+
 /// A spring that pulls as hard as friction holds: in the pauses alone, neither is told from the other.
 #[test]
 fn a_spring_beside_friction_at_rest_is_named_with_its_size() {

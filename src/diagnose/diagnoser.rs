@@ -20,8 +20,8 @@ use super::modesty::{make_modest, make_modest_beside_unknown};
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
 use super::remarks::{
-    coarse_remark, contact_remark, drift_remark, limited_drives, rest_remark, slow_remark,
-    tear_remark,
+    coarse_remark, contact_remark, drift_remark, held_remark, limited_drives, rest_remark,
+    slow_remark, tear_remark,
 };
 use super::replay::measured_nm;
 use super::rms::rms_where;
@@ -33,7 +33,7 @@ use super::verdict::{Cause, Diagnosis, HeldOut, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
-    Identifier, Measurement, Misreading, Options, Regression, drive_limit_remark,
+    HeldAtRest, Identifier, Measurement, Misreading, Options, Regression, drive_limit_remark,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -150,12 +150,15 @@ impl<'a> Diagnoser<'a> {
             slow: slow_remark(study, &measured_nm, &after_nm)
                 .filter(|_| causes.is_empty() && unexplained.is_none()),
         };
+        let not_tested: &[HeldAtRest] =
+            if study.scene.periodic { &[] } else { &identification.held_at_rest };
         let friction = (self.arm.friction_epsilon_rad_s, &study.scene.coulomb_nm[..]);
         let warnings = [
             log.warnings.clone(),
             identification.warnings.clone(),
             contact_remark(study, &log).into_iter().collect(),
             rest_remark(&regression.prepared.motion.qd_rad_s).into_iter().collect(),
+            held_remark(not_tested).into_iter().collect(),
             drive_limit_remark(self.arm, m.torque_nm).into_iter().collect(),
             coarse_remark(&coarse, &regression.prepared.angle_resolution_rad, friction)
                 .into_iter()

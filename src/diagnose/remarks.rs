@@ -8,7 +8,7 @@ use super::kind::Kind;
 use super::rms::rms_where;
 use super::study::Study;
 use super::verdict::{Cause, Unexplained};
-use crate::identify::{MOVING_RAD_S, drives_at_limits, resting_joints};
+use crate::identify::{HeldAtRest, MOVING_RAD_S, drives_at_limits, resting_joints};
 use crate::number::significant;
 use crate::robot::{Arm, JointSignals};
 
@@ -70,6 +70,18 @@ pub(super) fn rest_remark(qd_rad_s: &JointSignals) -> Option<String> {
         format!(
             "friction and gears are not looked at where joints do not move faster than {MOVING_RAD_S} rad/s, and their friction is not \
              identified: {}",
+            joints.join(", ")
+        )
+    })
+}
+
+/// States which joints stick between the moves of a single run, where nothing is tested.
+pub(super) fn held_remark(held: &[HeldAtRest]) -> Option<String> {
+    let joints: Vec<String> = held.iter().map(HeldAtRest::in_words).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "friction is held in pauses: {}. Along a single run no cause is looked for where a joint rests; along a motion that repeats, \
+             it would be named with its size",
             joints.join(", ")
         )
     })

@@ -15,6 +15,7 @@ use super::pauses::LONG_S;
 use super::problem::Problem;
 use crate::base::BaseSet;
 use crate::dynamics::Parameter;
+use crate::number::significant;
 use crate::signal::{mean_period, rms};
 
 /// Friction that one joint holds in its pauses.
@@ -126,6 +127,18 @@ impl HeldAtRest {
         let is_of_friction = (LEAST_HELD..MOST_HELD).contains(&(held_nm / coulomb_nm));
         let sticks = stands_out && is_of_friction;
         Some(Self { held_nm, sticks, ..self })
+    }
+
+    /// The joint and what it holds.
+    pub fn in_words(&self) -> String {
+        let Self { joint, held_nm, pauses, share, .. } = self;
+        format!(
+            "joint {} ({} Nm rms in {} pauses, {:.0} % of its rows)",
+            joint + 1,
+            significant(*held_nm, 3),
+            pauses.len(),
+            100.0 * share
+        )
     }
 
     /// Mean of one period of a signal over each pause.
@@ -276,6 +289,13 @@ mod tests {
         };
         assert!(told(2 * N).expect("something is held").sticks);
         assert_eq!(told(N / 2), None);
+    }
+
+    #[test]
+    fn what_is_held_is_told_with_its_rows() {
+        let pauses = vec![vec![0]; 5];
+        let held = HeldAtRest { joint: 1, held_nm: 2.4431, pauses, share: 0.482, ..paused() };
+        assert_eq!(held.in_words(), "joint 2 (2.44 Nm rms in 5 pauses, 48 % of its rows)");
     }
 
     #[test]
