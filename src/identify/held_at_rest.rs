@@ -11,7 +11,7 @@
 //! model do: these are of one size in moves and pauses, because pauses lie at the ends of moves.
 
 use super::fit::{Fitter, Weighting};
-use super::pauses::LONG_S;
+use super::pauses::{LONG_S, Pauses};
 use super::problem::Problem;
 use crate::base::BaseSet;
 use crate::dynamics::Parameter;
@@ -27,8 +27,8 @@ pub struct HeldAtRest {
     pub joint: usize,
     /// Root mean square, over the pauses, of what is held in each of them on average, Nm.
     pub held_nm: f64,
-    /// The samples of each pause in a period.
-    pub pauses: Vec<Vec<usize>>,
+    /// Its pauses in a period, or in the rows of a single run.
+    pub pauses: Pauses,
     /// Share of the rows of the joint that are left out for them.
     pub share: f64,
     /// Whether the joint sticks: what else the model lacks would not show in pauses so much more than in motion.
@@ -51,22 +51,22 @@ const LEAST_HELD: f64 = 0.05;
 pub const MOST_HELD: f64 = 1.5;
 
 impl HeldAtRest {
-    /// Joints that hold friction in their pauses or may do so, along the motion of `problem`; `pauses_of` has the rows of
-    /// each pause of a joint. `ready` leaves the rows of pauses out of a problem and makes it ready for a fit.
+    /// Joints that hold friction in their pauses or may do so, along the motion of `problem`, in which they have these
+    /// `pauses`. `ready` leaves the rows of pauses out of a problem and makes it ready for a fit.
     pub(super) fn of(
         problem: &Problem,
         set: &BaseSet,
-        pauses_of: impl Fn(usize) -> Vec<Vec<usize>>,
+        pauses: &[Pauses],
         ready: impl FnOnce(&mut Problem, &[Self]),
     ) -> Vec<Self> {
         let n = problem.samples;
-        let of_joint = |joint: usize| {
-            let pauses = pauses_of(joint);
+        let of_joint = |(joint, pauses): (usize, &Pauses)| {
+            let pauses = pauses.clone();
             let rows: usize = pauses.iter().map(Vec::len).sum();
             let share = rows as f64 / n as f64;
             (rows > 0).then_some(Self { log: 0, joint, held_nm: 0.0, pauses, share, sticks: false })
         };
-        let all: Vec<Self> = (0..problem.joints()).filter_map(of_joint).collect();
+        let all: Vec<Self> = pauses.iter().enumerate().filter_map(of_joint).collect();
         if all.is_empty() {
             return Vec::new();
         }

@@ -12,7 +12,7 @@ use super::lowered::Lowered;
 use super::measurement::Measurement;
 use super::motion_noise::moved_to_mean;
 use super::options::Options;
-use super::pauses::{pauses, pauses_of_run};
+use super::pauses::{Pauses, pauses, pauses_of_run};
 use super::prepare::Preparer;
 use super::prepared::{Prepared, Processing};
 use super::problem::{Assembler, Problem};
@@ -164,7 +164,7 @@ impl<'a> Identifier<'a> {
         &self,
         prepared: &Prepared,
         velocities: impl FnOnce() -> JointSignals,
-    ) -> Vec<Vec<Vec<usize>>> {
+    ) -> Vec<Pauses> {
         let (rate_hz, epsilon_rad_s) = (self.problem.rate_hz, self.model.friction_epsilon_rad_s());
         let joints = 0..self.problem.joints();
         if prepared.replicates.is_some() {
@@ -313,7 +313,7 @@ impl<'a> Identifier<'a> {
     fn solve(
         &mut self,
         mut prepared: Prepared,
-        pauses: &[Vec<Vec<usize>>],
+        pauses: &[Pauses],
         instruments: Option<&Problem>,
         log: &str,
     ) -> Result<Identification, IdentifyError> {
@@ -430,21 +430,16 @@ impl<'a> Identifier<'a> {
     fn held_at_rest(
         &mut self,
         prepared: &Prepared,
-        pauses: &[Vec<Vec<usize>>],
+        pauses: &[Pauses],
     ) -> (Vec<HeldAtRest>, Vec<HeldAtRest>) {
         if !prepared.held_at_rest.is_empty() {
             return (prepared.held_at_rest.clone(), Vec::new());
         }
         let Self { clock, problem, model, set, .. } = self;
-        let all = HeldAtRest::of(
-            problem,
-            set,
-            |j| pauses[j].clone(),
-            |moving, held| {
-                take_out_drive_answers(moving, clock, model, prepared, held);
-                leave_out(moving, held, false);
-            },
-        );
+        let all = HeldAtRest::of(problem, set, pauses, |moving, held| {
+            take_out_drive_answers(moving, clock, model, prepared, held);
+            leave_out(moving, held, false);
+        });
         all.into_iter().partition(|held| held.sticks)
     }
 

@@ -6,6 +6,9 @@ use super::prediction::resting_joints;
 use crate::cumulative_sum::accumulate;
 use crate::robot::JointSignals;
 
+/// The samples, or rows, of each pause of one joint.
+pub type Pauses = Vec<Vec<usize>>;
+
 /// A joint pauses where its speed stays below this share of the width ε over which friction turns round, ...
 const STILL: f64 = 0.25;
 /// ... for this long, s. A joint that reverses at 0.05 rad/s² or more is faster by then, for the ε of 0.02 rad/s that the
@@ -14,18 +17,15 @@ pub(super) const LONG_S: f64 = 0.2;
 /// Most pauses in a period. Cycles of moves have 10 to 30. Many more are pieces of a pause in which the velocity is not
 /// free of its noise; and for every shape of a law, the columns of so many would fill gigabytes.
 const MOST: usize = 60;
-/// How far a low-pass smears a row, in periods of its cut-off: the default one follows a step to within 2 % from there on.
-const SMEARED: f64 = 1.0;
+/// How far a low-pass smears a row, in periods of its cut-off: the default one follows a step to within 7 % from there on.
+const SMEARED: f64 = 0.5;
+/// Velocities of a single run are averaged over this time before and behind each row, s.
+const SMOOTH_S: f64 = 0.025;
 
 /// The samples of each pause of joint `j` along one period of the velocities `qd_rad_s`, sampled at `rate_hz`; ε is
 /// `epsilon_rad_s`. None for a joint that does not move, whose slow stretches lie between no moves; and where there are
 /// more than 60.
-pub fn pauses(
-    qd_rad_s: &JointSignals,
-    j: usize,
-    rate_hz: f64,
-    epsilon_rad_s: f64,
-) -> Vec<Vec<usize>> {
+pub fn pauses(qd_rad_s: &JointSignals, j: usize, rate_hz: f64, epsilon_rad_s: f64) -> Pauses {
     if resting_joints(qd_rad_s).contains(&j) {
         return Vec::new();
     }
@@ -42,20 +42,22 @@ pub(super) fn pauses_of_run(
     rate_hz: f64,
     epsilon_rad_s: f64,
     cutoff_hz: f64,
-) -> Vec<Vec<usize>> {
+) -> Pauses {
     if resting_joints(qd_rad_s).contains(&j) {
         return Vec::new();
     }
     let least = (LONG_S * rate_hz).ceil() as usize;
     let beside = (SMEARED * rate_hz / cutoff_hz).ceil() as usize;
     // The velocities of a single run are as noisy as they were recorded.
-    let qd = moving_mean(qd_rad_s.joint(j), beside);
-    let rows = 0..qd.len();
+    let qd = moving_mean(qd_rad_s.joint(j), (SMOOTH_S * rate_hz) as usize);
     let is_slow = |k: usize| qd[k].abs() < STILL * epsilon_rad_s;
-    let with_margins = |run: Range<usize>| {
-        (run.start.saturating_sub(beside)..(run.end + beside).min(rows.end)).collect()
-    };
-    runs_where(rows.clone(), least, is_slow).into_iter().map(with_margins).collect()
+    let mut is_left_out = vec![false; qd.len()];
+    for run in runs_where(0..qd.len(), least, is_slow) {
+        let with_margins = run.start.saturating_sub(beside)..(run.end + beside).min(qd.len());
+        is_left_out[with_margins].fill(true);
+    }
+    // Margins of two pauses may overlap.
+    runs_where(0..qd.len(), 1, |k| is_left_out[k]).into_iter().map(Iterator::collect).collect()
 }
 
 /// Mean of `y` over up to `beside` samples before and behind each sample.
@@ -71,7 +73,7 @@ fn moving_mean(y: &[f64], beside: usize) -> Vec<f64> {
 
 /// The samples of each run of at least `least` of the periodic velocities `qd_rad_s` that stay below `limit_rad_s`; none
 /// if there are more than 60.
-fn slow_runs(qd_rad_s: &[f64], limit_rad_s: f64, least: usize) -> Vec<Vec<usize>> {
+fn slow_runs(qd_rad_s: &[f64], limit_rad_s: f64, least: usize) -> Pauses {
     let n = qd_rad_s.len();
     let is_slow = |k: usize| qd_rad_s[k % n].abs() < limit_rad_s;
     // From the end of a move on, no pause is cut in two by the end of the period.
@@ -112,17 +114,17 @@ mod tests {
         assert_eq!(slow_runs(&qd, 0.5, 3), [vec![6, 7, 8], vec![10, 11, 0, 1]]);
     }
 
-    /// Ten rows per second and a cut-off of 5 Hz: a pause has two rows or more, and two on either side. A run does not go
-    /// round.
+    /// Ten rows per second and a cut-off of 5 Hz: a pause has two rows or more, and one on either side. A run does not go
+    /// round, and margins of two pauses that meet make one.
     #[test]
     fn pauses_of_a_run_have_margins_and_end_with_it() {
         let mut qd = vec![1.0; 40];
-        qd[10..20].fill(0.0);
-        qd[32..].fill(0.0);
+        for pause in [10..15, 17..20, 32..40] {
+            qd[pause].fill(0.0);
+        }
         let qd_rad_s = JointSignals::from_fn(1, 40, |_, k| qd[k]);
-        // The mean over five rows shows a move up to two rows beside it.
         let pauses = pauses_of_run(&qd_rad_s, 0, 10.0, 0.02, 5.0);
-        assert_eq!(pauses, [(10..20).collect::<Vec<_>>(), (32..40).collect()]);
+        assert_eq!(pauses, [(9..21).collect::<Vec<_>>(), (31..40).collect()]);
     }
 
     #[test]
