@@ -16,7 +16,7 @@ use super::image::{Image, Span};
 use super::intervals;
 use super::kind::Kind;
 use super::misfit::{self, KnownOfJoints, Left};
-use super::modesty::{make_modest, make_modest_beside_unknown};
+use super::modesty::{make_modest, make_modest_along_moves, make_modest_beside_unknown};
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
 use super::remarks::{
@@ -24,6 +24,7 @@ use super::remarks::{
     slow_remark, tear_remark,
 };
 use super::replay::measured_nm;
+use super::rests::rests;
 use super::rms::rms_where;
 use super::sentences::Besides;
 use super::settled::{beside_model, residual};
@@ -121,6 +122,9 @@ impl<'a> Diagnoser<'a> {
         let mut causes = in_order(faults, causes, study.scene.periodic);
         let tears = take_out_tears(&mut causes, m);
         make_modest(&mut causes, simulation.is_some());
+        if (0..study.scene.joints()).any(|j| !rests(&study.scene, j).is_empty()) {
+            make_modest_along_moves(&mut causes);
+        }
 
         // What is left, and how sure the causes are beside it.
         let [before_rms_nm, after_rms_nm] = [&before_nm, &after_nm].map(rms);
