@@ -8,7 +8,8 @@
 //!
 //! The model is fitted without the pauses of all joints. If a joint does not stick, it also predicts its torque there. If
 //! it does, the torque in the pauses is off by far more than while the joint moves, which is what other errors of the
-//! model do: these are of one size in moves and pauses, because pauses lie at the ends of moves.
+//! model do: these are of one size in moves and pauses, because pauses lie at the ends of moves. Not so a torque that acts
+//! only while the joint moves, such as friction that differs between directions: it passes for friction that is held.
 
 use super::fit::{Fitter, Weighting};
 use super::pauses::{LONG_S, Pauses};
