@@ -46,8 +46,8 @@ fn assert_weighed(repetition: Repetition, pauses: RangeInclusive<usize>) {
     let joints: Vec<usize> = found.held_at_rest.iter().map(|held| held.joint).collect();
     assert_eq!(joints, [1, 2]);
     for held in &found.held_at_rest {
-        println!("joint {}: last pause {:?}", held.joint + 1, held.pauses.last());
-        assert!(pauses.contains(&held.pauses.len()), "{} pauses", held.pauses.len());
+        let count = held.pauses.len();
+        assert!(pauses.contains(&count), "joint {} pauses {count} times", held.joint + 1);
     }
     let set = &simulation.scenario.set;
     let truth = set.values(&Model::new(&simulation.scenario.arm).standard_parameters());

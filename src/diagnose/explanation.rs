@@ -17,9 +17,9 @@ pub(super) struct Explanation<'a> {
     /// The log along the motion of the arm as it was estimated last.
     pub study: Study<'a>,
     causes: Vec<Contender>,
-    /// The causes with their alternatives, and what each gains on periods that were left out of its fit
-    /// ([`Kept::likely`]).
+    /// The causes with their alternatives.
     pub selected: Vec<Selected>,
+    /// What each cause gains on periods that were left out of its fit ([`Kept::drop_idle`]).
     pub gains: Vec<Option<f64>>,
     /// The model without causes.
     pub null: Extension,

@@ -17,14 +17,14 @@ const NEXT_TO_NOTHING: f64 = 0.1;
 /// Causes of a joint that remove less than this share of what can be explained there, all together, leave more than they
 /// explain: beside something unexplained, they are as likely a part of it.
 const SMALLER_PART: f64 = 0.5;
+/// Limit for a cause with so small a gain beside something unexplained. Of eleven such names in three logs of another
+/// simulator none was right; by Clopper and Pearson (1934), fewer than one in four are, with 95 % confidence.
+const BESIDE_MORE: f64 = 0.25;
 /// Delays that are shorter than this, s, ...
 const SHORT_S: f64 = 1e-3;
 /// ... and fainter than this are in doubt along moves with pauses. In another simulator six of twelve logs of
 /// such moves had one that was not there (0.4 to 0.9 ms, 4 to 6 σ); of designed motions, seventeen of seventeen were there.
 const FAINT: f64 = 8.0;
-/// Limit for a cause with so small a gain beside something unexplained. Of eleven such names in three logs of another
-/// simulator none was right; by Clopper and Pearson (1934), fewer than one in four are, with 95 % confidence.
-const BESIDE_MORE: f64 = 0.25;
 /// Probability that a joint has a fault of its own.
 const FAULTY: f64 = 0.1;
 /// A cause with less than this share of the strength of another one beside it may be what the approximate law of the

@@ -1,7 +1,22 @@
 //! Times and joint velocities of the rows of a regression.
 
+use super::prepared::Prepared;
+use super::problem::Problem;
 use super::regression::Regression;
 use crate::robot::JointSignals;
+
+/// Velocities of the rows of `problem`, of all periods, rad/s: it was laid out from the sample `first` of `prepared` on, each
+/// `every` samples.
+pub(super) fn row_velocities(
+    prepared: &Prepared,
+    problem: &Problem,
+    [first, every]: [usize; 2],
+) -> JointSignals {
+    let (n, qd_rad_s) = (problem.samples, &prepared.motion.qd_rad_s);
+    JointSignals::from_fn(qd_rad_s.joints(), n * problem.periods, |j, k| {
+        qd_rad_s.joint(j)[first + k % n * every]
+    })
+}
 
 /// Time and velocity of every row, of all periods.
 #[derive(Debug, Clone)]
@@ -20,12 +35,10 @@ impl Course {
         let rate_hz = processing.rate_hz;
         let start_s = processing.window_s[0] + regression.first_sample as f64 / rate_hz;
         let step_s = regression.every as f64 / rate_hz;
-        let qd_rad_s = &regression.prepared.motion.qd_rad_s;
+        let laid_out = [regression.first_sample, regression.every];
         Self {
             time_s: (0..n * periods).map(|k| start_s + k as f64 * step_s).collect(),
-            qd_rad_s: JointSignals::from_fn(qd_rad_s.joints(), n * periods, |j, k| {
-                qd_rad_s.joint(j)[regression.sample(k % n)]
-            }),
+            qd_rad_s: row_velocities(&regression.prepared, &regression.problem, laid_out),
         }
     }
 

@@ -43,7 +43,7 @@ const STANDS_OUT: f64 = 3.0;
 /// Rms of what is held over its scatter between the periods from which on it is no noise.
 const CERTAIN: f64 = 10.0;
 /// Least number of means, in pauses and in motion, that are compared along a single run, which has no scatter between periods.
-/// Two rms values of ten means of noise differ by a factor of 3 in one of 1100 logs.
+/// Two rms values of ten independent means of noise differ by a factor of 3 in one of 1100 logs.
 const LEAST_STRETCHES: usize = 10;
 /// Smallest friction that is called held, relative to that in motion: a description of friction near rest is not exact.
 const LEAST_HELD: f64 = 0.05;
@@ -271,11 +271,9 @@ mod tests {
     #[test]
     fn a_single_run_tells_what_is_held_by_its_moves() {
         let mut run = problem(|k| [0.0, 2.0, 0.0, -1.0][k / 100]);
-        let all = [paused(), paused()].map(|held| held.pauses);
-        let later = |k: &usize| k + N;
-        let second: Vec<Vec<usize>> =
-            all[1].iter().map(|pause| pause.iter().map(later).collect()).collect();
-        let pauses = [all[0].clone(), second].concat();
+        let first = paused().pauses;
+        let later = |pause: &Vec<usize>| pause.iter().map(|k| k + N).collect();
+        let pauses = [first.clone(), first.iter().map(later).collect()].concat();
         run.unfold();
         let told = |samples: usize| {
             let mut run = run.clone();

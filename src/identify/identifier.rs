@@ -1,5 +1,6 @@
 //! From a raw log to θ̂ and σ: the one path that real logs and simulated trials share.
 
+use super::course::row_velocities;
 use super::covariance::{CovarianceError, CovarianceKind};
 use super::drifting_friction::TakenOut;
 use super::drive_answers::without_drive_answers;
@@ -107,7 +108,8 @@ impl<'a> Identifier<'a> {
     pub fn identify(&mut self, m: &Measurement) -> Result<Identification, IdentifyError> {
         let (prepared, first, every) = self.fill_from(m, false)?;
         let instruments = self.instruments_for(self.options.estimator, &prepared)?;
-        let pauses = self.pauses(&prepared, || self.velocities(&prepared, [first, every]));
+        let pauses =
+            self.pauses(&prepared, || row_velocities(&prepared, &self.problem, [first, every]));
         self.solve(prepared, &pauses, instruments.as_ref(), m.source)
     }
 
@@ -174,14 +176,6 @@ impl<'a> Identifier<'a> {
         let (qd_rad_s, cutoff_hz) = (velocities(), self.options.cutoff_hz);
         let of_joint = |j| pauses_of_run(&qd_rad_s, j, rate_hz, epsilon_rad_s, cutoff_hz);
         joints.map(of_joint).collect()
-    }
-
-    /// Velocities of the rows of the single run `prepared`, rad/s, from its sample `first` on, each `every` samples.
-    fn velocities(&self, prepared: &Prepared, [first, every]: [usize; 2]) -> JointSignals {
-        let qd_rad_s = &prepared.motion.qd_rad_s;
-        JointSignals::from_fn(qd_rad_s.joints(), self.problem.samples, |j, k| {
-            qd_rad_s.joint(j)[first + k * every]
-        })
     }
 
     fn fill_from(
@@ -484,7 +478,8 @@ impl<'a> Identifier<'a> {
         methods: &[(Estimator, Vec<CovarianceKind>)],
     ) -> Result<Vec<Result<Estimate, IdentifyError>>, IdentifyError> {
         let (mut prepared, first, every) = self.fill_from(m, false)?;
-        let pauses = self.pauses(&prepared, || self.velocities(&prepared, [first, every]));
+        let pauses =
+            self.pauses(&prepared, || row_velocities(&prepared, &self.problem, [first, every]));
         let by_instruments = methods.iter().map(|(e, _)| *e).find(|e| *e == Estimator::Iv);
         let instruments = self.instruments_for(by_instruments, &prepared)?;
         self.take_out_drift(&mut prepared);
